@@ -170,6 +170,14 @@ TEST(LightNoise, IsThatOfTheHighestFrequencyAndSharedByThePlace) {
   }
 }
 
+TEST(MeasuredCapture, IsOfASimulatedCameraIfItsFramesSaySo) {
+  Frame frame = frameOfLight();
+  frame.provenance.kind = FrameKind::Simulated;
+  EXPECT_TRUE(captureOf({frame, frame}).is_simulated);
+  frame.provenance.kind = FrameKind::Real;
+  EXPECT_FALSE(captureOf({frame, frame}).is_simulated);
+}
+
 TEST(LightNoise, IsHiddenWhereASimulatedCameraDoesNotSayIt) {
   Frame simulated = frameOfLight();
   simulated.provenance.kind = FrameKind::Simulated;

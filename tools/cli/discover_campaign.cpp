@@ -54,9 +54,9 @@ void CampaignOptions::add(Arguments& args) {
   args.option("--samples-per-pixel", samples_per_pixel, "of a run: light paths at most")
       .within(1, 65'536)
       .showsDefault();
-  args.option("--max-surfaces", max_surfaces, "of a run: surfaces that a light path may touch")
-      .within(1, 64)
-      .showsDefault();
+  args.option("--max-surfaces", max_surfaces,
+              "of a run: surfaces that a light path may touch (16 of a real camera, 4 of a simulated one)")
+      .within(1, 64);
   args.option("--without", without, "of a run: effects that are not to be thought of")
       .separatedBy(',')
       .oneAtATime();

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -15,7 +16,8 @@ struct CampaignOptions {
   std::vector<std::string> scenes_of;
   bool is_b = false;
   bool keep_locked = false;
-  int samples_per_pixel = 256, max_surfaces = 4;
+  int samples_per_pixel = 256;
+  std::optional<int> max_surfaces{};
   std::vector<std::string> without;
   std::string note;
   void add(Arguments& args);

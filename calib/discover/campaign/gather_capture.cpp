@@ -256,7 +256,8 @@ struct CaptureGatherer::State {
     if (capture.frames == 0) camera = frame.camera, capture.moment = frame.moment;
     mean_moment.add(frame.moment);
     light.add(frame);
-    if (frame.provenance.kind == FrameKind::Simulated && !frame.moment.exposures.empty())
+    capture.is_simulated |= frame.provenance.kind == FrameKind::Simulated;
+    if (capture.is_simulated && !frame.moment.exposures.empty())
       capture.drawn_by.emplace_back(frame.provenance.seed, frame.moment.exposures.front().start.ns);
     if (!(frame.camera == camera))
       return ofCapture(capture.record, "its camera model changes between frames");

@@ -251,7 +251,7 @@ sim::TraceRequest requestFor(const Declared& declared, const std::vector<Measure
   request.world_from_camera = movedBy(*captures[site.first].moment.world_from_camera, stood);
   request.sampler = sim::Sampler::Even;  // what tiles share would look like a pattern of the camera
   request.samples_per_pixel = options.samples_per_pixel;
-  request.max_surfaces = options.max_surfaces;
+  request.max_surfaces = options.max_surfaces.value_or(captures[site.first].is_simulated ? 4 : 16);
   request.pixel_extent = options.pixel_extent;
   request.seed = options.seed + (number + 1) * kGolden;
   // Of gates the tracer knows no range, nor how well: they get all samples.

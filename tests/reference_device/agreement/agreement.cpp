@@ -28,6 +28,8 @@ sim::RangeImage simulated(const AgreementJob& job) {
   request.max_surfaces = job.max_surfaces;
   request.sampler = sim::Sampler::Even;
   request.seed = job.seed;
+  request.region_x = job.first_column, request.region_width = job.columns;
+  request.region_height = job.columns > 0 ? request.camera.height : 0;
   const sim::Scene scene = valueOf(sim::Scene::load(job.scene));
   Moment moment;
   moment.exposures = quiet.exposures({});
@@ -64,14 +66,16 @@ Agreement agreementOf(const AgreementJob& job) {
   Agreement all;
   double noise = 0.0, squares = 0.0, gains = 0.0, edge_squares = 0.0;
   for (std::size_t i = 0; i < ours.range_m.size(); ++i) {
-    const double off_mm = 1e3 * static_cast<double>(theirs.range_m[i] - ours.range_m[i]);
+    const int x = static_cast<int>(i) % ours.width - job.first_column, y = static_cast<int>(i) / ours.width;
+    if (x < 0 || x >= theirs.range_m.width()) continue;
+    const double off_mm = 1e3 * static_cast<double>(theirs.range_m(x, y) - ours.range_m[i]);
     if (std::isnan(off_mm)) continue;
     if (isAtEdge(ours, i)) {
       ++all.edges, all.edge_mean_mm += off_mm, edge_squares += off_mm * off_mm;
       continue;
     }
     const double amplitude = static_cast<double>(ours.amplitude[i]);
-    const double gain = std::log(static_cast<double>(theirs.amplitude[i]) / amplitude);
+    const double gain = std::log(static_cast<double>(theirs.amplitude(x, y)) / amplitude);
     ++all.pixels, all.mean_mm += off_mm, squares += off_mm * off_mm, all.mean_gain += gain,
         gains += gain * gain;
     all.worst_mm = std::max(all.worst_mm, std::abs(off_mm));

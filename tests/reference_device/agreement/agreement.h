@@ -23,6 +23,7 @@ struct AgreementJob {
   std::filesystem::path camera, scene;
   Transform<World, Camera> world_from_camera{};
   double exposure_scale = 1.0;
+  int first_column = 0, columns = 0;  ///< only these are traced; 0: all
   int samples_per_pixel = 1024, max_surfaces = 32;
   std::uint64_t seed = 1;
 };

@@ -2,7 +2,9 @@
 #include "tests/reference_device/device/light.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <optional>
 
 #include "tests/reference_device/device/constants.h"
 
@@ -12,6 +14,8 @@ namespace {
 /// Of a pixel in which an edge or a shadow's edge lies: the additive recurrence of the plastic number, whose
 /// shares of areas are right within about 3 / kEdgeSamples.
 constexpr int kEdgeSamples = 2400;
+/// Light from other boards, which changes less, is gathered there at the middles of so many squares along each side.
+constexpr int kEdgePlaces = 6;
 
 struct Lamp {
   Vec3d at_m;  ///< in the world
@@ -33,18 +37,13 @@ double irradianceBy(const Room& room, const Lamp& lamp, Vec3d axis, Vec3d at, Ve
 
 }  // namespace
 
-/// What is the same for all pixels of a pose, and what a pixel gathers while it is looked at.
+/// What is the same for all pixels of a pose.
 struct Transport::View {
   Transform<World, Camera> world_from_camera;
   CameraInfo camera;
   Vec3d axis{};
   std::vector<Lamp> lamps;
-  struct Seen {
-    std::size_t board = 0;
-    double weight = 0.0;
-    Vec3d sum{}, normal{};
-  };
-  std::vector<Seen> seen;  ///< boards in the pixel
+  Radiosity::Solution solution{};
 
   [[nodiscard]] Vec3d ray(double u, double v) const {
     return world_from_camera.rotate(rayThroughPixel(camera, u, v).v);
@@ -61,6 +60,18 @@ Transport::Transport(Room room, const Datasheet& sheet, const RadiosityOptions& 
         terms_.push_back({f, static_cast<std::size_t>(n), n * wavenumbers_[f]});
     }
   }
+}
+
+/// How far the next board is from what the pixel sees, in its sizes: light from there changes over such a way.
+double Transport::sizesToTheNext(const View& view, const Meeting& met, Vec3d ray) const {
+  const Board& board = room_.boards[met.board];
+  const Vec3d at = view.world_from_camera.translation_m + met.distance_m * ray;
+  const double size_m = met.distance_m / view.camera.fx / std::max(0.1, std::abs(dot(ray, board.normal)));
+  double nearest_m = INFINITY;
+  for (const Board& other : room_.boards) {
+    if (!areStuckTogether(board, other)) nearest_m = std::min(nearest_m, distanceBetween(at, other));
+  }
+  return nearest_m / size_m;
 }
 
 bool Transport::isSmooth(const View& view, int x, int y) const {
@@ -87,18 +98,15 @@ bool Transport::isSmooth(const View& view, int x, int y) const {
   return true;
 }
 
-void Transport::addSample(Light& light, View& view, std::size_t pixel, double u, double v,
+bool Transport::addDirect(Light& light, const View& view, std::size_t pixel, double u, double v,
                           double weight) const {
   const Vec3d origin = view.world_from_camera.translation_m, ray = view.ray(u, v);
   const auto met = firstMeeting(room_, origin, ray);
-  if (!met) return;
+  if (!met) return false;
   const Board& board = room_.boards[met->board];
   const Vec3d at = origin + met->distance_m * ray;
   const Vec3d normal = dot(ray, board.normal) < 0.0 ? board.normal : -board.normal;
   light.albedo[pixel] += weight * board.albedo;
-  auto seen = std::ranges::find(view.seen, met->board, &View::Seen::board);
-  if (seen == view.seen.end()) seen = view.seen.insert(seen, {met->board, 0.0, {}, normal});
-  seen->weight += weight, seen->sum = seen->sum + weight * at;
   for (const Lamp& lamp : view.lamps) {
     double way = 0.0;
     const double radiance =
@@ -110,50 +118,72 @@ void Transport::addSample(Light& light, View& view, std::size_t pixel, double u,
           std::polar(radiance, -term.wavenumber * (way + met->distance_m));
     }
   }
+  return true;
 }
 
-void Transport::addIndirect(Light& light, const View& view, const Radiosity::Solution& solution,
-                            std::size_t pixel) const {
-  for (const View::Seen& seen : view.seen) {
-    const Vec3d at = seen.sum / seen.weight;
-    const auto shines = radiosity_.gather(solution, seen.board, at, seen.normal);
-    const double factor = seen.weight * room_.boards[seen.board].albedo / kPi;
-    const double back_m = norm(at - view.world_from_camera.translation_m);
-    light.steady[pixel] += factor * shines[0].real();
-    for (std::size_t t = 0; t < terms_.size(); ++t) {
-      light.phasor(terms_[t].frequency, terms_[t].harmonic, pixel) +=
-          factor * shines[t + 1] * std::polar(1.0, -terms_[t].wavenumber * back_m);
-    }
+void Transport::addIndirect(Light& light, const View& view, std::size_t pixel, double u, double v,
+                            double weight) const {
+  if (radiosity_.empty()) return;
+  const Vec3d origin = view.world_from_camera.translation_m, ray = view.ray(u, v);
+  const auto met = firstMeeting(room_, origin, ray);
+  if (!met) return;
+  const Board& board = room_.boards[met->board];
+  const Vec3d normal = dot(ray, board.normal) < 0.0 ? board.normal : -board.normal;
+  const auto shines = radiosity_.gather(view.solution, met->board, origin + met->distance_m * ray, normal);
+  const double factor = weight * board.albedo / kPi;
+  light.steady[pixel] += factor * shines[0].real();
+  for (std::size_t t = 0; t < terms_.size(); ++t) {
+    light.phasor(terms_[t].frequency, terms_[t].harmonic, pixel) +=
+        factor * shines[t + 1] * std::polar(1.0, -terms_[t].wavenumber * met->distance_m);
   }
 }
 
-void Transport::seePixel(Light& light, View& view, int x, int y) const {
+void Transport::seePixel(Light& light, const View& view, int x, int y) const {
   const auto pixel =
       static_cast<std::size_t>(y) * static_cast<std::size_t>(light.width) + static_cast<std::size_t>(x);
-  view.seen.clear();
   const Vec3d middle = view.ray(x, y);
-  if (const auto met = firstMeeting(room_, view.world_from_camera.translation_m, middle)) {
+  const auto met = firstMeeting(room_, view.world_from_camera.translation_m, middle);
+  if (met) {
     light.range_m[pixel] = met->distance_m;
     light.cosine[pixel] = std::abs(dot(middle, room_.boards[met->board].normal));
   }
-  if (isSmooth(view, x, y)) {  // Gauss–Legendre, two points along each side: exact for cubics
-    const double off = 0.5 / std::sqrt(3.0);
+  const double sizes = met ? sizesToTheNext(view, *met, middle) : INFINITY;
+  if (isSmooth(view, x, y) && sizes > 2.0) {
+    const double off = 0.5 / std::sqrt(3.0);  // Gauss–Legendre, two points along each side: exact for cubics
     for (const double dv : {-off, off}) {
-      for (const double du : {-off, off}) addSample(light, view, pixel, x + du, y + dv, 0.25);
+      for (const double du : {-off, off}) {
+        addDirect(light, view, pixel, x + du, y + dv, 0.25);
+        if (sizes < 8.0) addIndirect(light, view, pixel, x + du, y + dv, 0.25);
+      }
     }
+    if (sizes >= 8.0) addIndirect(light, view, pixel, x, y, 1.0);
     return;
   }
   constexpr double kPlastic = 1.32471795724474602596;
+  using Place = std::array<double, 2>;
+  int covered = 0;
+  std::optional<Place> first;
   for (int i = 0; i < kEdgeSamples; ++i) {
     double whole = 0.0;
     const double du = std::modf(0.5 + i / kPlastic, &whole) - 0.5;
     const double dv = std::modf(0.5 + i / (kPlastic * kPlastic), &whole) - 0.5;
-    addSample(light, view, pixel, x + du, y + dv, 1.0 / kEdgeSamples);
+    if (!addDirect(light, view, pixel, x + du, y + dv, 1.0 / kEdgeSamples)) continue;
+    ++covered;
+    if (!first) first = {x + du, y + dv};
   }
+  std::vector<Place> places;
+  for (int i = 0; i < kEdgePlaces * kEdgePlaces; ++i) {
+    const double u = x - 0.5 + (i % kEdgePlaces + 0.5) / kEdgePlaces;
+    const double v = y - 0.5 + (i / kEdgePlaces + 0.5) / kEdgePlaces;
+    if (firstMeeting(room_, view.world_from_camera.translation_m, view.ray(u, v))) places.push_back({u, v});
+  }
+  if (places.empty() && first) places.push_back(*first);
+  const double share = static_cast<double>(covered) / kEdgeSamples / static_cast<double>(places.size());
+  for (const auto& [u, v] : places) addIndirect(light, view, pixel, u, v, share);
 }
 
 Light Transport::see(const Transform<World, Camera>& world_from_camera) const {
-  View view{.world_from_camera = world_from_camera, .camera = sheet_.camera(), .lamps = {}, .seen = {}};
+  View view{.world_from_camera = world_from_camera, .camera = sheet_.camera(), .lamps = {}};
   view.axis = world_from_camera.rotate({0, 0, 1});
   for (const auto& emitter : sheet_.emitters) {
     const Vec3d at{emitter.position_mm[0] / 1e3, emitter.position_mm[1] / 1e3, emitter.position_mm[2] / 1e3};
@@ -177,7 +207,7 @@ Light Transport::see(const Transform<World, Camera>& world_from_camera) const {
 
   std::vector<double> wavenumbers{0.0};
   for (const Term& term : terms_) wavenumbers.push_back(term.wavenumber);
-  const auto solution = radiosity_.solve(wavenumbers, [&](Vec3d at, Vec3d normal) {
+  view.solution = radiosity_.solve(wavenumbers, [&](Vec3d at, Vec3d normal) {
     std::vector<std::complex<double>> shines(wavenumbers.size());
     for (const Lamp& lamp : view.lamps) {
       double way = 0.0;
@@ -188,13 +218,7 @@ Light Transport::see(const Transform<World, Camera>& world_from_camera) const {
     return shines;
   });
   for (int y = 0; y < light.height; ++y) {
-    for (int x = 0; x < light.width; ++x) {
-      seePixel(light, view, x, y);
-      if (radiosity_.empty()) continue;
-      addIndirect(
-          light, view, solution,
-          static_cast<std::size_t>(y) * static_cast<std::size_t>(light.width) + static_cast<std::size_t>(x));
-    }
+    for (int x = 0; x < light.width; ++x) seePixel(light, view, x, y);
   }
   return light;
 }

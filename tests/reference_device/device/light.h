@@ -45,10 +45,11 @@ class Transport {
 
  private:
   struct View;
-  void addSample(Light& light, View& view, std::size_t pixel, double u, double v, double weight) const;
-  void addIndirect(Light& light, const View& view, const Radiosity::Solution& solution,
-                   std::size_t pixel) const;
-  void seePixel(Light& light, View& view, int x, int y) const;
+  /// Whether there is anything.
+  bool addDirect(Light& light, const View& view, std::size_t pixel, double u, double v, double weight) const;
+  void addIndirect(Light& light, const View& view, std::size_t pixel, double u, double v, double weight) const;
+  void seePixel(Light& light, const View& view, int x, int y) const;
+  [[nodiscard]] double sizesToTheNext(const View& view, const Meeting& met, Vec3d ray) const;
   [[nodiscard]] bool isSmooth(const View& view, int x, int y) const;
 
   Room room_;

@@ -10,28 +10,16 @@
 namespace toftwin::reference {
 namespace {
 
-/// Farther than this many times its size a patch is as good as a point: relative error below 1/(6 · 64).
-constexpr double kFarSquare = 64.0;
-/// Paper on a board: what is between them is dark.
-constexpr double kStuckOn_m = 1e-3;
-
+/// Farther than this many times its longer side, squared, a patch is as good as a point: relative error below 1/(6 · 64).
+constexpr double kFarSquare = 256.0;
 /// Whether a place looks at a board from its front, and how far it is above the board's plane.
 double heightOver(Vec3d at, Vec3d on, Vec3d normal) { return dot(at - on, normal); }
 
-/// Patches are no shorter than this where the next board comes nearer along them, or else than that.
-constexpr double kFinest_m = 0.002, kCoarsest_m = 0.1;
-
-double distanceBetween(Vec3d place, const Board& board) {
-  const Vec3d way = place - board.centre_m;
-  const double u = std::clamp(dot(way, board.a_m) / dot(board.a_m, board.a_m), -1.0, 1.0);
-  const double v = std::clamp(dot(way, board.b_m) / dot(board.b_m, board.b_m), -1.0, 1.0);
-  return norm(way - u * board.a_m - v * board.b_m);
-}
-
-bool areStuckTogether(const Board& a, const Board& b) {
-  return norm(cross(a.normal, b.normal)) < 1e-9 &&
-         std::abs(dot(a.centre_m - b.centre_m, a.normal)) < kStuckOn_m;
-}
+/// Patches are no shorter than this where the next board comes nearer along them.
+constexpr double kFinest_m = 0.002;
+/// Where not, times the fineness: than this at the end of their own board, than the second elsewhere; and nowhere longer
+/// than the third, unless there.
+constexpr double kFineAlong_m = 0.033, kLongAlong_m = 0.33, kLongest_m = 0.2;
 
 /// A rectangle's corners as seen from a place, cut off at its horizon.
 struct Visible {
@@ -106,13 +94,15 @@ void Radiosity::addSide(std::size_t index, double side, const std::vector<std::s
                bottom = away(u, part.v1);
   const double nearest = std::min({left, right, top, bottom, away(u, v)});
   const double width = (part.u1 - part.u0) * norm(board.a_m), height = (part.v1 - part.v0) * norm(board.b_m);
-  const auto isLong = [&](double length, double change) {
-    return length > std::max(options_.fineness * nearest, change > 0.3 * length ? kFinest_m : kCoarsest_m);
+  const auto isLong = [&](double length, double change, double to_end) {
+    const double along = options_.fineness * std::clamp(2.0 * to_end, kFineAlong_m, kLongAlong_m);
+    return length > std::max(options_.fineness * std::min(nearest, kLongest_m),
+                             change > 0.3 * length ? kFinest_m : along);
   };
-  if (isLong(width, std::abs(left - right))) {
+  if (isLong(width, std::abs(left - right), (1.0 - std::abs(u)) * norm(board.a_m))) {
     addSide(index, side, others, {part.u0, u, part.v0, part.v1});
     addSide(index, side, others, {u, part.u1, part.v0, part.v1});
-  } else if (isLong(height, std::abs(top - bottom))) {
+  } else if (isLong(height, std::abs(top - bottom), (1.0 - std::abs(v)) * norm(board.b_m))) {
     addSide(index, side, others, {part.u0, part.u1, part.v0, v});
     addSide(index, side, others, {part.u0, part.u1, v, part.v1});
   } else {
@@ -133,7 +123,8 @@ double Radiosity::formFactor(Vec3d at_m, Vec3d normal, const Patch& patch) const
   const double square = dot(way, way), height = dot(way, normal), back = -dot(way, patch.normal);
   if (height <= 0.0 || back <= 0.0 || square < options_.least_transfer_m * options_.least_transfer_m)
     return 0.0;
-  if (square > kFarSquare * patch.area) return height * back * patch.area / (kPi * square * square);
+  const double side_square = 4.0 * std::max(dot(patch.a, patch.a), dot(patch.b, patch.b));
+  if (square > kFarSquare * side_square) return height * back * patch.area / (kPi * square * square);
   // F = 1/(2π) |Σ_edges γ_k n·e_k|, γ the angle that an edge covers, e the unit normal of its plane with the
   // place
   const Visible visible = aboveHorizon(patch.corners, at_m, normal);
@@ -157,7 +148,7 @@ Radiosity::Exchange Radiosity::exchange(Vec3d at_m, Vec3d normal, const Patch& p
   const double v = std::clamp(dot(way, patch.b) / (half_b * half_b), -1.0, 1.0);
   const double nearest = norm(way - u * patch.a - v * patch.b);
   const auto parts = [&](double half) {
-    return std::clamp(static_cast<int>(std::ceil(2.0 * half / nearest)), 1, 12);
+    return std::clamp(static_cast<int>(std::ceil(8.0 * half / nearest)), 1, 200);
   };
   const int across = parts(half_a), down = parts(half_b);
   if (across * down == 1) return {formFactor(at_m, normal, patch), norm(way)};
@@ -195,10 +186,48 @@ void Radiosity::connect() {
   if (!any) patches_.clear(), transfers_.clear();
 }
 
+/// `source` and all that it becomes from bounce to bounce. Real and imaginary parts lie apart, so that the sums over
+/// transfers are of plain numbers.
+std::vector<std::complex<float>> Radiosity::bounced(const std::vector<std::complex<float>>& source,
+                                                    double wavenumber) const {
+  constexpr int kMostBounces = 60;
+  constexpr float kEnough = 1e-5F;
+  struct Turned {
+    std::size_t from;
+    float real, imaginary;
+  };
+  std::vector<std::vector<Turned>> turned(patches_.size());
+  for (std::size_t i = 0; i < patches_.size(); ++i) {
+    turned[i].reserve(transfers_[i].size());
+    for (const Transfer& one : transfers_[i]) {
+      const auto factor = std::polar(one.factor, -static_cast<float>(wavenumber) * one.distance_m);
+      turned[i].push_back({one.from, factor.real(), factor.imag()});
+    }
+  }
+  std::vector<std::complex<float>> all = source;
+  std::vector<float> real(patches_.size()), imaginary(patches_.size());
+  for (std::size_t i = 0; i < patches_.size(); ++i) real[i] = all[i].real(), imaginary[i] = all[i].imag();
+  std::vector<float> next_real(patches_.size()), next_imaginary(patches_.size());
+  for (int bounce = 0; bounce < kMostBounces; ++bounce) {
+    float most = 0.0F, whole = 0.0F;
+    for (std::size_t i = 0; i < patches_.size(); ++i) {
+      float re = 0.0F, im = 0.0F;
+      for (const Turned& one : turned[i]) {
+        re += one.real * real[one.from] - one.imaginary * imaginary[one.from];
+        im += one.real * imaginary[one.from] + one.imaginary * real[one.from];
+      }
+      next_real[i] = re, next_imaginary[i] = im;
+      all[i] += std::complex<float>{re, im};
+      most = std::max(most, re * re + im * im), whole = std::max(whole, std::norm(all[i]));
+    }
+    std::swap(real, next_real), std::swap(imaginary, next_imaginary);
+    if (most <= kEnough * kEnough * whole) break;
+  }
+  return all;
+}
+
 Radiosity::Solution Radiosity::solve(const std::vector<double>& wavenumbers, const Source& direct) const {
   using Value = std::complex<float>;
-  constexpr int kMostBounces = 60;
-  constexpr float kEnough = 1e-6F;
   Solution solution{wavenumbers, {}};
   if (patches_.empty()) return solution;
   std::vector<std::vector<Value>> source(wavenumbers.size(), std::vector<Value>(patches_.size()));
@@ -211,32 +240,8 @@ Radiosity::Solution Radiosity::solve(const std::vector<double>& wavenumbers, con
       }
     }
   }
-  for (std::size_t w = 0; w < wavenumbers.size(); ++w) {
-    std::vector<std::vector<Value>> turned(patches_.size());
-    for (std::size_t i = 0; i < patches_.size(); ++i) {
-      turned[i].reserve(transfers_[i].size());
-      for (const Transfer& one : transfers_[i])
-        turned[i].push_back(std::polar(one.factor, -static_cast<float>(wavenumbers[w]) * one.distance_m));
-    }
-    std::vector<Value> all = source[w], last = source[w], next(patches_.size());
-    for (int bounce = 0; bounce < kMostBounces; ++bounce) {
-      float most = 0.0F, whole = 0.0F;
-      for (std::size_t i = 0; i < patches_.size(); ++i) {
-        float real = 0.0F, imaginary = 0.0F;
-        for (std::size_t t = 0; t < turned[i].size(); ++t) {
-          const Value f = turned[i][t], from = last[transfers_[i][t].from];
-          real += f.real() * from.real() - f.imag() * from.imag();
-          imaginary += f.real() * from.imag() + f.imag() * from.real();
-        }
-        next[i] = {real, imaginary};
-        all[i] += next[i];
-        most = std::max(most, std::norm(next[i])), whole = std::max(whole, std::norm(all[i]));
-      }
-      std::swap(last, next);
-      if (most <= kEnough * kEnough * whole) break;
-    }
-    solution.irradiance.push_back(std::move(all));
-  }
+  for (std::size_t w = 0; w < wavenumbers.size(); ++w)
+    solution.irradiance.push_back(bounced(source[w], wavenumbers[w]));
   return solution;
 }
 

@@ -13,7 +13,8 @@
 namespace toftwin::reference {
 
 struct RadiosityOptions {
-  double fineness = 0.3;  ///< a patch is at most this share as long as the next board is away
+  /// A patch is at most this share as long as the next board, or the end of its own, is away, and of 20 cm.
+  double fineness = 0.3;
   double least_transfer_m =
       0.0;  ///< light between places that are nearer to each other than this is left out
 };
@@ -64,6 +65,8 @@ class Radiosity {
   [[nodiscard]] Exchange exchange(Vec3d at_m, Vec3d normal, const Patch& patch) const;
   void addSide(std::size_t board, double side, const std::vector<std::size_t>& others, const Part& part);
   void connect();
+  [[nodiscard]] std::vector<std::complex<float>> bounced(const std::vector<std::complex<float>>& source,
+                                                         double wavenumber) const;
 
   Room room_;
   RadiosityOptions options_;

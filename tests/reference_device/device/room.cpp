@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "tests/reference_device/device/room.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <map>
@@ -128,6 +129,19 @@ std::optional<Meeting> firstMeeting(const Room& room, Vec3d origin_m, Vec3d dire
   }
   if (std::isinf(first.distance_m)) return std::nullopt;
   return first;
+}
+
+double distanceBetween(Vec3d place, const Board& board) {
+  const Vec3d way = place - board.centre_m;
+  const double u = std::clamp(dot(way, board.a_m) / dot(board.a_m, board.a_m), -1.0, 1.0);
+  const double v = std::clamp(dot(way, board.b_m) / dot(board.b_m, board.b_m), -1.0, 1.0);
+  return norm(way - u * board.a_m - v * board.b_m);
+}
+
+bool areStuckTogether(const Board& a, const Board& b) {
+  constexpr double kStuckOn_m = 1e-3;
+  return norm(cross(a.normal, b.normal)) < 1e-9 &&
+         std::abs(dot(a.centre_m - b.centre_m, a.normal)) < kStuckOn_m;
 }
 
 bool isHidden(const Room& room, Vec3d from_m, Vec3d to_m) {

@@ -33,6 +33,10 @@ struct Meeting {
 };
 /// Beyond `least_m`; direction of unit length.
 std::optional<Meeting> firstMeeting(const Room& room, Vec3d origin_m, Vec3d direction, double least_m = 1e-9);
+/// From a place to the nearest one on a board.
+double distanceBetween(Vec3d place, const Board& board);
+/// Paper on a board: what is between them is dark.
+bool areStuckTogether(const Board& a, const Board& b);
 /// Whether anything stands between two points; boards that either of them lies on do not count.
 bool isHidden(const Room& room, Vec3d from_m, Vec3d to_m);
 
