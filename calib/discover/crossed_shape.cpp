@@ -11,6 +11,7 @@ namespace toftwin::discover {
 namespace {
 
 constexpr std::size_t kMostTerms = 16;  ///< of a curve that is crossed
+constexpr std::size_t kTermsOfAFormula = 2;  ///< at most: what has more is a series of waves
 
 /// Of one covariate of the camera's or the scene's; what light does there (a delay, a gain) may be multiplied in.
 bool canBeCrossed(const Context& context, const Explanation& one) {
@@ -58,11 +59,16 @@ FittedForm withCurveOverTheOther(const Context& context, const FittedForm& one, 
   return sum;
 }
 
-/// As of all pairs: what two things explain each by itself is no product.
-bool beatsTheSum(const Context& context, const FittedForm& one, const Explanation& product) {
+/// Held-out captures say so, and by so much.
+bool isMoreBy(double enough, const Gain& more, const Gain& less) {
+  const Gain by = beyond(more, less);
+  return holds(by) && by.total >= enough;
+}
+
+/// What two things explain each by itself is no product.
+bool beatsTheSum(const Context& context, const FittedForm& one, const Explanation& product, double enough) {
   const auto sums = judged(context, {withCurveOverTheOther(context, one, product)});
-  if (sums.empty()) return true;
-  return isMoreThanParts(product.gain, sums.front().gain);
+  return sums.empty() || isMoreBy(enough, product.gain, sums.front().gain);
 }
 
 }  // namespace
@@ -78,14 +84,12 @@ std::optional<std::size_t> crossedShape(const Context& context, std::vector<Expl
   std::vector<Explanation> crossed = judged(context, std::move(forms));
   const auto best = std::ranges::max_element(crossed, {}, [](const Explanation& e) { return e.gain.total; });
   if (best == crossed.end()) return std::nullopt;
-  // What is as good uncrossed, within two standard errors, is told uncrossed. A curve, and what light does to first order,
+  // What is as good uncrossed is told uncrossed. A curve, the first waves of a series, and what light does to first order
   // are right to some per cent; and the best of many is better than it is.
-  const double shape = (one.fitted.form.build != nullptr ? 0.02 : 0.05) * best->gain.total;
-  const double luck = luckOfTheBestOf(crossed.size());
-  const auto isMore = [&](const Explanation& e) {
-    const Gain more = beyond(e.gain, one.gain);
-    return holds(more) && more.total >= std::max({2.0 * difference(e.gain, one.gain).error, luck, shape});
-  };
+  const bool is_exact = one.fitted.form.build != nullptr && one.fitted.group.terms.size() <= kTermsOfAFormula;
+  const double shape = (is_exact ? 0.02 : 0.05) * best->gain.total;
+  const double enough = std::max(luckOfTheBestOf(crossed.size()), shape);
+  const auto isMore = [&](const Explanation& e) { return isMoreBy(enough, e.gain, one.gain); };
   if (!isMore(*best)) return std::nullopt;
   // Of those that are not told from the best, the one with the fewest numbers.
   const auto isWorse = [&](const Explanation& e) {
@@ -94,7 +98,7 @@ std::optional<std::size_t> crossedShape(const Context& context, std::vector<Expl
   const auto simplest = std::ranges::min_element(crossed, {}, [&](const Explanation& e) {
     return std::tuple{isWorse(e), e.numbers, -e.gain.total};
   });
-  if (!beatsTheSum(context, one.fitted, *simplest)) return std::nullopt;
+  if (!beatsTheSum(context, one.fitted, *simplest, enough)) return std::nullopt;
   const std::size_t place = all.size() + static_cast<std::size_t>(simplest - crossed.begin());
   all.insert(all.end(), std::make_move_iterator(crossed.begin()), std::make_move_iterator(crossed.end()));
   return place;

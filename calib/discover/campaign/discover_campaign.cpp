@@ -13,6 +13,7 @@
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/found_model.h"
 #include "calib/discover/campaign/frames_apart.h"
+#include "calib/discover/campaign/frames_beat.h"
 #include "calib/discover/campaign/gather_capture.h"
 #include "calib/discover/campaign/light_noise.h"
 #include "calib/discover/campaign/locked_places.h"
@@ -300,6 +301,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   auto campaign = readFor(job, {});
   if (!campaign) return campaign.error();
   const auto apart = framesApart(campaign->captures, job.finder.seed);
+  const auto beat = apart ? std::nullopt : framesBeat(campaign->captures, job.finder.seed);
   if (apart && apart->isMinority()) campaign = readFor(job, apart->which);
   if (!campaign) return campaign.error();
   if (auto whole = checkLockedFiles(job, *campaign); !whole) return whole.error();
@@ -353,6 +355,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   finding.zero.delay_mm += declared.delay_mm, finding.zero.gain_percent += declared.unit_percent;
   if (steps) addSteps(job, declared.model, *steps, finding);
   if (apart) addFramesApart(*apart, finding);
+  if (beat) finding.effects.push_back(effectOf(*beat)), finding.alike_p = beat->p;
   finding.model_toml = modelText(files->text, declared, finding);
   progress.begin();
   if (job.open_locked && !campaign->locked.empty()) {

@@ -10,7 +10,7 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/statistics.h"
+#include "calib/discover/campaign/frame_values.h"
 #include "calib/discover/draws.h"
 
 namespace toftwin::discover {
@@ -19,7 +19,6 @@ namespace {
 /// Residuals of four frames after a line and a mean are not alike in any order, and a few captures do not say how far
 /// their sums scatter.
 constexpr std::size_t kFewestFrames = 6, kFewestCaptures = 6;
-constexpr std::size_t kAllPairs = 64;
 constexpr std::uint64_t kMostPeriod = 16, kMostInCapture = 4;
 constexpr int kDraws = 2000;
 constexpr double kMostP = 0.002;
@@ -33,27 +32,6 @@ struct Series {
   std::array<double, kKinds> spread{};
   std::array<std::vector<double>, kKinds> as_read{};
 };
-
-/// The median of the sizes, in standard deviations of Gaussian noise: a frame or two that are off do not make it large.
-double spreadOf(std::vector<double> numbers) {
-  for (double& one : numbers) one = std::abs(one);
-  return compare::quantile(std::move(numbers), 0.5) / 0.6745;
-}
-
-/// The drift as the median of the slopes between all pairs (P. K. Sen, J. Am. Stat. Assoc. 63 (1968) 1379): a frame
-/// that is off does not tilt it. Of many frames, those half of them apart.
-std::vector<double> withoutDrift(std::vector<double> numbers) {
-  const std::size_t n = numbers.size();
-  std::vector<double> slopes;
-  for (std::size_t k = n > kAllPairs ? n / 2 : 1; k < n; ++k)
-    for (std::size_t i = n > kAllPairs ? k - n / 2 : 0; i < k; i += n > kAllPairs ? n : 1)
-      slopes.push_back((numbers[k] - numbers[i]) / static_cast<double>(k - i));
-  const double slope = compare::quantile(std::move(slopes), 0.5);
-  for (std::size_t k = 0; k < n; ++k) numbers[k] -= slope * static_cast<double>(k);
-  const double mean = std::accumulate(numbers.begin(), numbers.end(), 0.0) / static_cast<double>(n);
-  for (double& one : numbers) one -= mean;
-  return numbers;
-}
 
 std::optional<Series> seriesOf(const MeasuredCapture& capture) {
   if (capture.each.size() < kFewestFrames) return std::nullopt;

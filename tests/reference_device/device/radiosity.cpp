@@ -10,7 +10,8 @@
 namespace toftwin::reference {
 namespace {
 
-/// Farther than this many times its longer side, squared, a patch is as good as a point: relative error below 1/(6 · 64).
+/// Farther than this many times its longer side, squared, a patch is as good as a point: relative error below
+/// 1/(6 · 256).
 constexpr double kFarSquare = 256.0;
 /// Whether a place looks at a board from its front, and how far it is above the board's plane.
 double heightOver(Vec3d at, Vec3d on, Vec3d normal) { return dot(at - on, normal); }

@@ -1,0 +1,16 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+/// What the frames of a capture say one after the other, without what drifts.
+namespace toftwin::discover {
+
+/// The median of the sizes, in standard deviations of Gaussian noise: a frame or two that are off do not make it large.
+double spreadOf(std::vector<double> numbers);
+
+/// Without their mean and their straight drift, the median of the slopes between all pairs (P. K. Sen, J. Am. Stat.
+/// Assoc. 63 (1968) 1379): a frame that is off does not tilt it. Of more than 64, those half of them apart.
+std::vector<double> withoutDrift(std::vector<double> numbers);
+
+}  // namespace toftwin::discover
