@@ -22,7 +22,7 @@ constexpr std::size_t kFewestInPiece = 8, kMostInPiece = 32, kFewestBeating = 6;
 constexpr double kFromZero = 2.25, kFromHalf = 1.0, kSlowest = 0.15;
 constexpr double kToneStep = 0.25 / kMostInPiece;  ///< of the frequencies, in turns a frame
 constexpr int kOrders = 2000;
-constexpr double kMostChance = 0.0005;
+constexpr double kMostChance = 0.0005, kFewestDeviations = 4.0;
 constexpr std::size_t kOfBeat = 2;  ///< range and gain
 
 /// Frames in a row, in units of their spread.
@@ -203,6 +203,7 @@ std::optional<FramesBeat> framesBeat(const std::vector<MeasuredCapture>& capture
   if (told < kFewestBeating || tones.empty()) return std::nullopt;
   const auto usual = usualOf(pieces);
   const LargestTone most = largest(tones, pieces, usual);
+  if (most.deviations < kFewestDeviations) return std::nullopt;
   Draws draws{seed};
   std::vector<Piece> drawn = pieces;
   int as_large = 0;
