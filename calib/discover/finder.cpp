@@ -136,6 +136,9 @@ class Search {
       if (more.predicts) effect = std::move(more);
     }
     if (const auto doubtful = nameInDoubt(found_, effect)) {
+      // What a right name leaves by chance, or for being right to some per cent, is no reason to doubt it.
+      const double enough = std::max(2.0 * effect.gain.error, 0.02 * found_.effects[*doubtful].gain.mean);
+      if (effect.gain.mean < enough) return false;
       withdraw(*doubtful);
       return true;
     }

@@ -214,10 +214,11 @@ TEST(RawSays, OnlyWhatIsNearToAllOrNothingAndFarFromTheOther) {
   const auto says = [](double share, double error) { return RawSays{Difference{share, error}}.isBeforeDecoding(); };
   EXPECT_EQ(says(0.98, 0.05), true);
   EXPECT_EQ(says(0.04, 0.05), false);
-  EXPECT_EQ(says(0.7, 0.15), true);
+  EXPECT_EQ(says(0.71, 0.15), true);
   EXPECT_EQ(says(0.6, 0.25), std::nullopt) << "not far enough from nothing";
   EXPECT_EQ(says(0.475, 0.06), std::nullopt) << "surely a part: the form is not what acts";
   EXPECT_EQ(says(-0.6, 0.1), std::nullopt);
+  EXPECT_EQ(says(0.42, 0.186), std::nullopt) << "a halo in the light: 3.1 errors from 1, 2.3 from 0";
   EXPECT_EQ(RawSays{}.isBeforeDecoding(), std::nullopt);
 }
 

@@ -50,7 +50,7 @@ struct RawSays {
   /// it says with all that was found.
   double contradiction = 0.0;
 
-  /// Whether it acts before they are decoded: near to the one, to a quarter or three standard errors, and three of
+  /// Whether it acts before they are decoded: near to the one, to a quarter or two standard errors, and three of
   /// these from the other.
   [[nodiscard]] std::optional<bool> isBeforeDecoding() const;
   [[nodiscard]] bool contradicts() const { return contradiction > 4.0; }

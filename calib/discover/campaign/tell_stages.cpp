@@ -110,10 +110,10 @@ void addStagesOfOthers(std::optional<bool> is_before, bool contradict, Effect& e
 
 std::optional<bool> RawSays::isBeforeDecoding() const {
   // What is neither, though it is known well, is not what the form says, of which the phase shows a part.
-  constexpr double kSure = 3.0, kNear = 0.25;
+  constexpr double kSure = 3.0, kNear = 0.25, kNearErrors = 2.0;
   if (!share) return std::nullopt;
   const double behind = std::abs(share->mean), before = std::abs(1.0 - share->mean);
-  const double sure = kSure * share->error, near = std::max(kNear, sure);
+  const double sure = kSure * share->error, near = std::max(kNear, kNearErrors * share->error);
   if (before < behind && behind > sure && before < near) return true;
   if (behind < before && before > sure && behind < near) return false;
   return std::nullopt;
