@@ -14,8 +14,9 @@ namespace {
 /// Of a pixel in which an edge or a shadow's edge lies: the additive recurrence of the plastic number, whose
 /// shares of areas are right within about 3 / kEdgeSamples.
 constexpr int kEdgeSamples = 2400;
-/// Light from other boards, which changes less, is gathered there at the middles of so many squares along each side.
-constexpr int kEdgePlaces = 6;
+/// Light from other boards, which changes less, is gathered there at the middles of so many squares along each side; of
+/// fewer where the next board is more than eight pixels away.
+constexpr int kEdgePlaces = 6, kFewPlaces = 4;
 
 struct Lamp {
   Vec3d at_m;  ///< in the world
@@ -172,9 +173,9 @@ void Transport::seePixel(Light& light, const View& view, int x, int y) const {
     if (!first) first = {x + du, y + dv};
   }
   std::vector<Place> places;
-  for (int i = 0; i < kEdgePlaces * kEdgePlaces; ++i) {
-    const double u = x - 0.5 + (i % kEdgePlaces + 0.5) / kEdgePlaces;
-    const double v = y - 0.5 + (i / kEdgePlaces + 0.5) / kEdgePlaces;
+  const int side = sizes < 8.0 ? kEdgePlaces : kFewPlaces;
+  for (int i = 0; i < side * side; ++i) {
+    const double u = x - 0.5 + (i % side + 0.5) / side, v = y - 0.5 + (i / side + 0.5) / side;
     if (firstMeeting(room_, view.world_from_camera.translation_m, view.ray(u, v))) places.push_back({u, v});
   }
   if (places.empty() && first) places.push_back(*first);

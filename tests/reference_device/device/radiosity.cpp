@@ -16,11 +16,11 @@ constexpr double kFarSquare = 256.0;
 /// Whether a place looks at a board from its front, and how far it is above the board's plane.
 double heightOver(Vec3d at, Vec3d on, Vec3d normal) { return dot(at - on, normal); }
 
-/// Patches are no shorter than this where the next board comes nearer along them.
-constexpr double kFinest_m = 0.002;
-/// Where not, times the fineness: than this at the end of their own board, than the second elsewhere; and nowhere longer
-/// than the third, unless there.
-constexpr double kFineAlong_m = 0.033, kLongAlong_m = 0.33, kLongest_m = 0.2;
+/// Where the next board comes nearer along them patches are no shorter than this, and no longer than this times the
+/// fineness.
+constexpr double kFinest_m = 0.002, kLongest_m = 0.2;
+/// Where not, times the fineness: no shorter than this at the end of their own board, than the second elsewhere.
+constexpr double kFineAlong_m = 0.033, kLongAlong_m = 0.33;
 
 /// A rectangle's corners as seen from a place, cut off at its horizon.
 struct Visible {
@@ -97,8 +97,8 @@ void Radiosity::addSide(std::size_t index, double side, const std::vector<std::s
   const double width = (part.u1 - part.u0) * norm(board.a_m), height = (part.v1 - part.v0) * norm(board.b_m);
   const auto isLong = [&](double length, double change, double to_end) {
     const double along = options_.fineness * std::clamp(2.0 * to_end, kFineAlong_m, kLongAlong_m);
-    return length > std::max(options_.fineness * std::min(nearest, kLongest_m),
-                             change > 0.3 * length ? kFinest_m : along);
+    if (change > 0.3 * length) return length > std::max(options_.fineness * std::min(nearest, kLongest_m), kFinest_m);
+    return length > std::max(options_.fineness * nearest, along);
   };
   if (isLong(width, std::abs(left - right), (1.0 - std::abs(u)) * norm(board.a_m))) {
     addSide(index, side, others, {part.u0, u, part.v0, part.v1});
