@@ -29,4 +29,13 @@ std::vector<double> withoutDrift(std::vector<double> numbers) {
   return numbers;
 }
 
+Difference weightedMean(const std::vector<std::pair<double, double>>& each) {
+  double sum = 0.0, weights = 0.0, squares = 0.0;
+  for (const auto& [value, weight] : each) sum += weight * value, weights += weight;
+  const double mean = sum / weights;
+  for (const auto& [value, weight] : each) squares += weight * weight * (value - mean) * (value - mean);
+  const auto n = static_cast<double>(each.size());
+  return {mean, std::sqrt(squares * n / (n - 1.0)) / weights};
+}
+
 }  // namespace toftwin::discover

@@ -168,7 +168,6 @@ double differenceOf(const Alike& in, const Alike& out) {
 
 /// Over all captures, which count by their spread.
 std::optional<Difference> meanDifference(const FrameClass& which, const std::vector<Series>& all, std::size_t kind) {
-  double sum = 0.0, weights = 0.0, squares = 0.0;
   std::vector<std::pair<double, double>> each;  // difference, weight
   for (const Series& one : all) {
     Alike in, out;
@@ -177,13 +176,9 @@ std::optional<Difference> meanDifference(const FrameClass& which, const std::vec
     if (in.n == 0.0 || out.n == 0.0 || !(one.spread[kind] > 0.0)) continue;
     const double weight = 1.0 / (one.spread[kind] * one.spread[kind] * (1.0 / in.n + 1.0 / out.n));
     each.emplace_back(differenceOf(in, out), weight);
-    sum += weight * each.back().first, weights += weight;
   }
   if (each.size() < 2) return std::nullopt;
-  const double mean = sum / weights;
-  for (const auto& [value, weight] : each) squares += weight * weight * (value - mean) * (value - mean);
-  const auto n = static_cast<double>(each.size());
-  return Difference{mean, std::sqrt(squares * n / (n - 1.0)) / weights};
+  return weightedMean(each);
 }
 
 std::string ordinal(std::uint64_t number) {

@@ -154,7 +154,6 @@ std::array<double, kOfBeat> usualOf(const std::vector<Piece>& pieces) {
 
 /// The wave's amplitude, from A²/4 of each piece, each by its noise; none where it is not seen (2.5 standard errors).
 std::optional<Difference> amplitudeOf(const Tone& tone, const std::vector<Piece>& pieces, std::size_t kind) {
-  double sum = 0.0, weights = 0.0;
   std::vector<std::pair<double, double>> each;  // A², weight
   for (const std::size_t i : tone.pieces) {
     const Piece& piece = pieces[i];
@@ -162,14 +161,9 @@ std::optional<Difference> amplitudeOf(const Tone& tone, const std::vector<Piece>
     const double variance = piece.spread[kind] * piece.spread[kind], n = static_cast<double>(piece.value.size());
     const double square = 4.0 / n * variance * beyond(piece, tone.waves.at(piece.value.size()))[kind];
     each.emplace_back(square, n / variance);
-    sum += square * n / variance, weights += n / variance;
   }
   if (each.size() < 2) return std::nullopt;
-  const double mean = sum / weights;
-  double squares = 0.0;
-  for (const auto& [square, weight] : each) squares += weight * weight * (square - mean) * (square - mean);
-  const auto n = static_cast<double>(each.size());
-  const double error = std::sqrt(squares * n / (n - 1.0)) / weights;
+  const auto [mean, error] = weightedMean(each);
   if (!(mean > 2.5 * error)) return std::nullopt;
   const double amplitude = std::sqrt(mean);
   return Difference{amplitude, error / (2.0 * amplitude)};
