@@ -117,4 +117,11 @@ bool holds(const Gain& gain) {
   return false;
 }
 
+bool isMoreBy(double enough, const Gain& more, const Gain& less) {
+  Gain by{.total = more.total - less.total};
+  for (std::size_t c = 0; c < more.by_capture.size(); ++c)
+    by.by_capture.push_back(more.by_capture[c] - less.by_capture[c]);
+  return holds(by) && by.total >= enough;
+}
+
 }  // namespace toftwin::discover

@@ -42,5 +42,7 @@ Difference against0(const Gain& gain);
 /// noise, 2√gain each. One or two captures alone may have been bumped. A capture that says more than ten standard errors
 /// counts as one that says ten: that the coldest of five says three times as much as the next is no reason to doubt them.
 bool holds(const Gain& gain);
+/// Whether what one says more than the other holds, and is so much.
+bool isMoreBy(double enough, const Gain& more, const Gain& less);
 
 }  // namespace toftwin::discover

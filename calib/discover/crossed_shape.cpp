@@ -6,6 +6,7 @@
 #include <tuple>
 
 #include "calib/discover/candidates.h"
+#include "calib/discover/light_shape.h"
 
 namespace toftwin::discover {
 namespace {
@@ -32,14 +33,6 @@ bool isStrengthOf(const CovariateInfo& covariate) {
          spread.back() > spread.front();
 }
 
-/// What one says more than the other, capture by capture.
-Gain beyond(const Gain& more, const Gain& less) {
-  Gain by{.total = more.total - less.total};
-  for (std::size_t c = 0; c < more.by_capture.size(); ++c)
-    by.by_capture.push_back(more.by_capture[c] - less.by_capture[c]);
-  return by;
-}
-
 /// The curve, and one over the other covariate of the product added to it.
 FittedForm withCurveOverTheOther(const Context& context, const FittedForm& one, const Explanation& product) {
   constexpr std::size_t kKnots = 7;
@@ -59,16 +52,13 @@ FittedForm withCurveOverTheOther(const Context& context, const FittedForm& one, 
   return sum;
 }
 
-/// Held-out captures say so, and by so much.
-bool isMoreBy(double enough, const Gain& more, const Gain& less) {
-  const Gain by = beyond(more, less);
-  return holds(by) && by.total >= enough;
-}
-
-/// What two things explain each by itself is no product.
+/// What two things explain each by itself is no product, nor what moves the range and dims the light along one.
 bool beatsTheSum(const Context& context, const FittedForm& one, const Explanation& product, double enough) {
-  const auto sums = judged(context, {withCurveOverTheOther(context, one, product)});
-  return sums.empty() || isMoreBy(enough, product.gain, sums.front().gain);
+  std::vector<FittedForm> sums = withItsLight(context, one);
+  sums.push_back(withCurveOverTheOther(context, one, product));
+  return std::ranges::all_of(judged(context, std::move(sums)), [&](const Explanation& sum) {
+    return isMoreBy(enough, product.gain, sum.gain);
+  });
 }
 
 }  // namespace

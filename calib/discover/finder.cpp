@@ -10,6 +10,7 @@
 #include "calib/discover/crossed_shape.h"
 #include "calib/discover/estimate.h"
 #include "calib/discover/found_effects.h"
+#include "calib/discover/light_shape.h"
 #include "calib/discover/reshape_effects.h"
 #include "calib/discover/same_cause.h"
 #include "calib/discover/shape_choice.h"
@@ -45,6 +46,7 @@ class Search {
       if (static_cast<int>(found_.effects.size()) >= options_.most_effects) break;
       if (!addEffect(significance.p)) break;
     }
+    dropNeedlessParts(found_);
     if (found_.effects.size() > 1) {
       revise(found_);
       prune(found_);
@@ -127,8 +129,10 @@ class Search {
     auto explanations = compete(found_.context);
     auto chosen = chosenOf(found_.context, explanations);
     if (!chosen) return false;
+    if (const auto along = alongOne(found_.context, explanations, *chosen)) chosen = along;
     if (mayBeCrossed(explanations[*chosen]))
       if (const auto crossed = crossedShape(found_.context, explanations, *chosen)) chosen = crossed;
+    if (const auto of_light = lightShape(found_.context, explanations, *chosen)) chosen = of_light;
     Effect effect = effectOf(found_.context, explanations, *chosen);
     if (!effect.predicts || isWhatACurveLeaves(found_, effect)) return false;
     if (const auto part = partOfAKnown(found_, explanations, effect)) {

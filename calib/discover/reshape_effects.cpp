@@ -25,7 +25,15 @@ Context knowingOnly(const Found& found, const std::vector<Effect>& effects) {
   return context;
 }
 
+Effect partOf(FittedForm form) {
+  Effect part;
+  part.name = form.group.name, part.covariates = covariatesOf(form.group), part.stage = form.group.terms.front().stage;
+  part.parts.push_back(std::move(form));
+  return part;
+}
+
 void addPart(Effect& effect, const Effect& more) {
+  const bool is_first = effect.parts.empty();
   effect.parts.insert(effect.parts.end(), more.parts.begin(), more.parts.end());
   for (const std::string& name : more.covariates)
     if (std::ranges::count(effect.covariates, name) == 0) effect.covariates.push_back(name);
@@ -33,21 +41,46 @@ void addPart(Effect& effect, const Effect& more) {
   // No effect on ranges changes amplitudes.
   if (effect.stage != more.stage) effect.stage = Stage::Light;
   const std::string along = fmt::format("{}", fmt::join(effect.covariates, " and "));
-  effect.name = isFormula(effect) ? effect.name + " + " + more.name : "smooth in " + along;
+  effect.name = is_first             ? more.name
+                : isFormula(effect) ? effect.name + " + " + more.name
+                                     : "smooth in " + along;
 }
 
-Gain gainOfSum(const Context& without, const Effect& effect, const Effect& more) {
-  TermGroup sum{"sum", Kind::Generic, termsOf(effect), 0};
-  for (const Term& term : termsOf(more)) sum.terms.push_back(term);
+/// Of the terms of all these parts together, less what their inner numbers cost.
+Gain gainOfParts(const Context& without, const std::vector<FittedForm>& parts) {
+  TermGroup sum{"sum", Kind::Generic, {}, 0};
+  for (const FittedForm& part : parts)
+    sum.terms.insert(sum.terms.end(), part.group.terms.begin(), part.group.terms.end());
   std::vector<TermGroup> extra = without.known;
   extra.push_back(std::move(sum));
   const Marginal marginal = marginalise(evidenceOf(without, extra), without.scales);
   const Columns model = modelOf(without, marginal, extra.size());
   Gain gain = crossValidate(marginal, model, {marginal.groups.size() - 1}).front();
-  for (const std::vector<FittedForm>* parts : {&effect.parts, &more.parts})
-    for (const FittedForm& part : *parts)
-      for (const Inner& inner : part.form.inner) gain.total -= inner.price;
+  for (const FittedForm& part : parts)
+    for (const Inner& inner : part.form.inner) gain.total -= inner.price;
   return gain;
+}
+
+Gain gainOfSum(const Context& without, const Effect& effect, const Effect& more) {
+  std::vector<FittedForm> parts = effect.parts;
+  parts.insert(parts.end(), more.parts.begin(), more.parts.end());
+  return gainOfParts(without, parts);
+}
+
+/// The part without which the others predict other captures as well; of several the one that they miss least.
+std::optional<std::size_t> needlessPart(const Context& without, const std::vector<FittedForm>& parts) {
+  if (parts.size() < 2) return std::nullopt;
+  const Gain all = gainOfParts(without, parts);
+  std::optional<std::size_t> needless;
+  double most = 0.0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    std::vector<FittedForm> others = parts;
+    others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
+    const Gain less = gainOfParts(without, others);
+    if (isMoreBy(luckOfTheBestOf(1), all, less) || (needless && less.total <= most)) continue;
+    needless = i, most = less.total;
+  }
+  return needless;
 }
 
 }  // namespace
@@ -69,6 +102,18 @@ void reshape(Found& found, Effect& effect, const Effect& more) {
     }
   }
   addPart(effect, more);
+}
+
+void dropNeedlessParts(Found& found) {
+  for (Effect& effect : found.effects) {
+    const Context without = knowingOnly(found, othersThan(found, effect));
+    while (const auto needless = needlessPart(without, effect.parts)) {
+      std::vector<FittedForm> parts = std::move(effect.parts);
+      parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(*needless));
+      effect.parts.clear(), effect.covariates.clear(), effect.stage = parts.front().group.terms.front().stage;
+      for (FittedForm& part : parts) addPart(effect, partOf(std::move(part)));
+    }
+  }
 }
 
 void revise(Found& found) {

@@ -9,6 +9,10 @@ namespace toftwin::discover {
 /// shape, if one does as well as both together; else their sum.
 void reshape(Found& found, Effect& effect, const Effect& more);
 
+/// What was found first of an effect may be nothing beside the rest of it: raw exposures that are unequal beside waves
+/// of the range and of the gain. Numbers that answer for each other would be fitted far off.
+void dropNeedlessParts(Found& found);
+
 /// Each effect's shape once more, now that the others no longer stand in its way.
 void revise(Found& found);
 

@@ -336,14 +336,14 @@ std::vector<std::size_t> eligible(const std::vector<Explanation>& all) {
 
 namespace {
 
-/// One that the simulator has a form for; fewer covariates; then fewer numbers; of as many, a straight line, which says least; else what explains more.
+/// One that is not rare; fewer covariates; then fewer numbers; of as many, a straight line, which says least; else what explains more.
 bool isSimpler(const Explanation& one, const Explanation& other) {
   const auto isStraight = [](const Explanation& e) {
     const auto& terms = e.fitted.group.terms;
     return terms.size() == 1 && terms[0].factors.size() == 1 && terms[0].factors[0].shape == Shape::Power &&
            terms[0].factors[0].numbers[0] == 1.0;
   };
-  if (one.fitted.group.is_formless != other.fitted.group.is_formless) return other.fitted.group.is_formless;
+  if (one.fitted.group.is_rare != other.fitted.group.is_rare) return other.fitted.group.is_rare;
   if (one.covariates.size() != other.covariates.size()) return one.covariates.size() < other.covariates.size();
   if (one.numbers != other.numbers) return one.numbers < other.numbers;
   if (isStraight(one) != isStraight(other)) return isStraight(one);
@@ -399,9 +399,9 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
     if (all[i].is_catalogue || !(is_same || is_form || isLess(all[i]))) continue;
     const double by = all[*best].gain.total - all[i].gain.total;
     const double error = std::max(difference(all[*best].gain, all[i].gain).error, kRounding * all[*best].gain.total);
-    // The simulator has the simpler form, or has one of this alone, so that it is taken unless the data tell the two apart.
-    const bool has_form = all[*best].fitted.group.is_formless && !all[i].fitted.group.is_formless;
-    if (by > (is_form || has_form ? 2.0 : 1.0) * error) continue;
+    // The simulator has the simpler form, and many cameras have what is not rare: taken unless the data tell the two apart.
+    const bool is_likelier = all[*best].fitted.group.is_rare && !all[i].fitted.group.is_rare;
+    if (by > (is_form || is_likelier ? 2.0 : 1.0) * error) continue;
     if (isSimpler(all[i], all[chosen])) chosen = i;
   }
   return chosen;

@@ -65,7 +65,7 @@ struct TermGroup {
   int inner_numbers = 0;  ///< numbers inside its terms that were fitted, such as a time constant
   /// The carriers (their beginning) of which it is the simpler form, if it explains as much; empty: its own.
   std::string simpler_than{};
-  bool is_formless = false;  ///< the simulator has no form for it: taken where nothing that has one explains as much
+  bool is_rare = false;  ///< few cameras have it: taken where nothing else along the same explains as much
 };
 /// The covariates of all of its terms, each once.
 std::vector<std::string> covariatesOf(const TermGroup& group);

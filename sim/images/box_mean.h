@@ -10,10 +10,10 @@
 
 namespace toftwin::sim {
 
-/// Means over the valid pixels within `reach` columns and rows of each pixel, itself included; squares end at
-/// the image's edge. Of floats or complex floats; 0 where no pixel is valid.
+/// Means over the valid pixels within `columns` and `rows` of each pixel, itself included; boxes end at the image's
+/// edge. Of floats or complex floats; 0 where no pixel is valid.
 template <class T>
-Image<T> boxMean(const Image<T>& image, int reach) {
+Image<T> boxMean(const Image<T>& image, int columns, int rows) {
   constexpr bool kIsComplex = !std::is_floating_point_v<T>;
   using Sum = std::conditional_t<kIsComplex, std::complex<double>, double>;
   const auto isValid = [](const T& value) {
@@ -36,8 +36,8 @@ Image<T> boxMean(const Image<T>& image, int reach) {
   Image<T> mean(width, height);
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) {
-      const int left = std::max(0, x - reach), right = std::min(width, x + reach + 1);
-      const int top = std::max(0, y - reach), bottom = std::min(height, y + reach + 1);
+      const int left = std::max(0, x - columns), right = std::min(width, x + columns + 1);
+      const int top = std::max(0, y - rows), bottom = std::min(height, y + rows + 1);
       const auto over = [&](const auto& of) {
         return of(right, bottom) - of(left, bottom) - of(right, top) + of(left, top);
       };
@@ -45,6 +45,12 @@ Image<T> boxMean(const Image<T>& image, int reach) {
     }
   }
   return mean;
+}
+
+/// Of squares.
+template <class T>
+Image<T> boxMean(const Image<T>& image, int reach) {
+  return boxMean(image, reach, reach);
 }
 
 }  // namespace toftwin::sim

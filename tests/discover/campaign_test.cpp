@@ -174,6 +174,22 @@ TEST_F(Searched, APatternOfPixelsIsNamedByWhereItIs) {
   EXPECT_THAT(model->effectNames(), Contains("learned_range"));
 }
 
+/// Pixels of a row share wires. It is in the model: with no form nothing of it was removed.
+TEST_F(Searched, LightAlongRowsIsALineOfTheKernel) {
+  simulate("[[effect]]\ntype = 'learned_neighbours'\nreaches_px = []\nshares_percent = []\nrow_percent = 1.5\n");
+  const CampaignFinding finding = search(job());
+  ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
+  EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("neighbours")) << verdictOf(finding);
+  ASSERT_TRUE(finding.effects.front().fitted) << "the simulator has a form for it";
+  const auto* kernel = std::get_if<sim::LearnedNeighbours>(&finding.effects.front().fitted->effect);
+  ASSERT_NE(kernel, nullptr);
+  EXPECT_THAT(kernel->reaches_px, testing::IsEmpty());
+  for (const FittedNumber& number : finding.effects.front().fitted->numbers)
+    EXPECT_NEAR(number.value, number.key == "row_percent" ? 1.5 : 0.0, 4.0 * number.error) << number.key;
+  ASSERT_TRUE(finding.judgement);
+  EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
+}
+
 /// It is light: not a charge that happens to go with the exposure.
 TEST_F(Searched, TheSameLightInAllPixelsIsStrayLight) {
   simulate("[[effect]]\ntype = 'internal_reflection'\nradiance_w_per_m2_sr = 0.003\n");

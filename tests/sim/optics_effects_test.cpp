@@ -150,6 +150,18 @@ TEST(LearnedNeighbours, AddsUpItsSquaresOfTheLightAsItCame) {
   }
 }
 
+// Of a row of 11 pixels and a column of 9 with one bright one.
+TEST(LearnedNeighbours, PutsItsShareOfARowsAndAColumnsMeanIntoEachPixel) {
+  const Light light = syntheticLight(
+      11, 9, {20_MHz}, 2, [](int x, int y) { return std::vector<Way>{{x == 5 && y == 4 ? 5.0 : 0.0, 1.3}}; });
+  const LearnedNeighbours lines{.reaches_px = {}, .shares_percent = {}, .row_percent = 4.0, .column_percent = -2.0};
+  const Light seen = applied(lines, light, cameraOfSize(11, 9));
+  EXPECT_NEAR(seen.steady(0, 4), 0.04 * 5.0 / 11.0, 1e-6);
+  EXPECT_NEAR(seen.steady(5, 8), -0.02 * 5.0 / 9.0, 1e-6);
+  EXPECT_NEAR(seen.steady(5, 4), 5.0 + 0.04 * 5.0 / 11.0 - 0.02 * 5.0 / 9.0, 1e-6) << "itself included";
+  EXPECT_NEAR(seen.steady(4, 3), 0.0, 1e-9) << "in neither";
+}
+
 TEST(LearnedNeighbours, SaysWhatIsWrongWithItsKernel) {
   EXPECT_THAT(
       errorOf(plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'learned_neighbours'\nreaches_px = [1, 2, 3]\n")),

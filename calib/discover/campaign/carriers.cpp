@@ -33,27 +33,6 @@ std::string neighbourName(int reach) {
                         : fmt::format("{}:{}px", kNeighbours, reach);
 }
 
-/// Pixels of a row, or of a column, share wires: what of their mean comes along them.
-constexpr std::string_view kAlongRow = "neighbours:row", kAlongColumn = "neighbours:column";
-
-/// What is read is on the wire; what cannot be read is not known.
-Phasors meansAlong(const Phasors& z, bool is_row) {
-  std::vector<std::complex<double>> sum(static_cast<std::size_t>(is_row ? z.height() : z.width()));
-  std::vector<double> count(sum.size());
-  Phasors mean(z.width(), z.height());
-  const auto lineOf = [&](int x, int y) { return static_cast<std::size_t>(is_row ? y : x); };
-  for (int y = 0; y < z.height(); ++y) {
-    for (int x = 0; x < z.width(); ++x) {
-      if (!std::isfinite(std::norm(z(x, y)))) continue;
-      sum[lineOf(x, y)] += std::complex<double>{z(x, y)}, count[lineOf(x, y)] += 1.0;
-    }
-  }
-  for (int y = 0; y < z.height(); ++y)
-    for (int x = 0; x < z.width(); ++x)
-      mean(x, y) = std::complex<float>{sum[lineOf(x, y)] / std::max(1.0, count[lineOf(x, y)])};
-  return mean;
-}
-
 constexpr std::string_view kMirrored = "mirrored";
 /// Of squares about the mirrored place: a second image may be sharp, and seldom is.
 constexpr std::array kMirroredReaches{0, 3, 10};
@@ -120,7 +99,8 @@ std::map<std::string, Reading> carriersOf(const sim::SensorModel& model, const R
                 changeBy(shareOf(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
   }
   for (const std::string_view carrier : {kAlongRow, kAlongColumn}) {
-    const Phasors mean = meansAlong(z, carrier == kAlongRow);
+    const bool is_row = carrier == kAlongRow;
+    const Phasors mean = sim::boxMean(z, is_row ? z.width() : 0, is_row ? 0 : z.height());
     all.emplace(carrier, changeBy(shareOf(z, [&](std::size_t i) { return 0.01F * mean[i]; }), period_m));
   }
   const Phasors turned = mirrored(z, model.camera());

@@ -219,6 +219,14 @@ std::optional<LearnedEffect> kernelOf(const Along& along, const CameraInfo& came
     kernel.reaches_px.push_back(std::min(*reach, std::max(camera.width, camera.height)));
     kernel.shares_percent.push_back(std::clamp(coefficient, -100.0, 100.0));
   }
+  if constexpr (std::is_same_v<Kernel, sim::LearnedNeighbours>) {
+    for (const auto& [term, coefficient] : along.terms) {
+      if (!term.factors.empty() || (term.carrier != kAlongRow && term.carrier != kAlongColumn)) continue;
+      const bool is_row = term.carrier == kAlongRow;
+      (is_row ? kernel.row_percent : kernel.column_percent) = std::clamp(coefficient, -100.0, 100.0);
+      free.push_back(is_row ? "row_percent" : "column_percent");
+    }
+  }
   if (free.empty()) return std::nullopt;
   if constexpr (std::is_same_v<Kernel, sim::LearnedMirror>) {
     constexpr double kMost = 2.0;  // farther off, the first order says nothing

@@ -186,7 +186,9 @@ void addImageFigures(std::map<std::string, Draw>& figures) {
         .panels = {
             {"two squares", errorOf(effect("learned_neighbours"), light)},
             {"the wider alone",
-             errorOf(effect("learned_neighbours", "reaches_px = [15]\nshares_percent = [1]"), light)}}});
+             errorOf(effect("learned_neighbours", "reaches_px = [15]\nshares_percent = [1]"), light)},
+            {"along rows alone",
+             errorOf(effect("learned_neighbours", "reaches_px = []\nshares_percent = []\nrow_percent = 1"), light)}}});
   };
   figures["learned_mirror"] = [] {
     const Light light = boxBeforeWall(0.25);
