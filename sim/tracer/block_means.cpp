@@ -135,13 +135,12 @@ void countNoise(const Tracing& tracing, const BlockShape& shape, const BlockSums
   }
 }
 
-int samplesFor(const TraceRequest& request, const NoiseCount& noise, int pilot) {
+int samplesFor(Length wanted_noise, const NoiseCount& noise, int pilot, int most) {
   constexpr double kStep = 16.0;
-  if (noise.pixels == 0) return std::min(pilot, request.samples_per_pixel);
-  const double wanted = request.wanted_noise.in(metre), mean = noise.variance_m2 / noise.pixels;
+  if (noise.pixels == 0) return std::min(pilot, most);
+  const double wanted = wanted_noise.in(metre), mean = noise.variance_m2 / noise.pixels;
   const double needed = std::ceil(mean / (wanted * wanted) * pilot / kStep) * kStep;
-  return static_cast<int>(
-      std::clamp(needed, std::min(kStep, 1.0 * request.samples_per_pixel), 1.0 * request.samples_per_pixel));
+  return static_cast<int>(std::clamp(needed, std::min(kStep, 1.0 * most), 1.0 * most));
 }
 
 Block pilotOf(const Block& block) {

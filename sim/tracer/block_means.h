@@ -43,8 +43,8 @@ struct NoiseCount {
 void countNoise(const Tracing& tracing, const BlockShape& shape, const BlockSums& sums,
                 const BlockMeans& means, NoiseCount& noise);
 /// How many samples it takes for the root mean square of the pixels' noise to be the wanted one, when `pilot`
-/// of them left `noise`: a multiple of 16 from 16 up to the request's.
-int samplesFor(const TraceRequest& request, const NoiseCount& noise, int pilot);
+/// of them left `noise`: a multiple of 16 from 16 up to `most`.
+int samplesFor(Length wanted_noise, const NoiseCount& noise, int pilot, int most);
 /// The same block with random numbers of its own.
 Block pilotOf(const Block& block);
 

@@ -2,6 +2,7 @@
 #include "sim/tracer/edge_pixels.h"
 
 #include <algorithm>
+#include <cmath>
 #include <complex>
 #include <limits>
 
@@ -15,17 +16,20 @@ constexpr int kCornerBlocks = 3;  ///< a side: nine corners lie in three blocks 
 /// Tells the edges' random numbers from those of all other light, which goes on from the same pixels.
 constexpr std::uint32_t kEdgeSalt = 0x2545f491u;
 
+constexpr int kSide = Tile::kSide, kBlockSide = Tile::kBlockShape.width;
+
 /// What a place sends towards the camera.
 struct Seen {
   std::complex<float> phasor;  ///< of the highest frequency
   float steady;
+  float lit;  ///< what arrives there, so to speak: `steady` by the albedo; negative where there is no surface
 };
+using Corners = std::array<const Seen*, 4>;  ///< of a pixel
 
-/// Adds direct light of sixteen paths from the camera on.
-void traceDirect(const Tracing& tracing, Packet& packet, LaneSums& sums) {
+/// Adds direct light of sixteen paths from the camera on; those that meet nothing are no longer valid.
+void traceDirect(const Tracing& tracing, Packet& packet, Hits& hits, LaneSums& sums) {
   constexpr bool is_coherent = true;
   RTCRayHit16 rays;
-  Hits hits;
   Lanes<float> unused{};
   intersect(tracing, packet, rays, is_coherent);
   endMissed(0.0f, rays, packet, unused);
@@ -49,11 +53,15 @@ void seeCorners(const Tracing& tracing, int x, int y, LaneSums& sums, std::array
   preparePacket(tracing, own, packet);
   startInTheMiddle(tracing, own, packet);
   clearSums(sums);
-  traceDirect(tracing, packet, sums);
+  Hits hits;
+  traceDirect(tracing, packet, hits, sums);
   const std::size_t term = tracing.highest() * static_cast<std::size_t>(tracing.request.harmonics);
-  for (std::size_t i = 0; i < kLaneCount; ++i)
-    seen[i] = {term < sums.re.size() ? std::complex{sums.re[term][i], sums.im[term][i]} : sums.steady[i],
-               sums.steady[i]};
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const float steady = sums.steady[i];
+    seen[i].phasor = term < sums.re.size() ? std::complex{sums.re[term][i], sums.im[term][i]} : steady;
+    seen[i].steady = steady;
+    seen[i].lit = packet.valid[i] == 0 ? -1.0f : steady > 0.0f ? steady / hits.albedo[i] : 0.0f;
+  }
 }
 
 /// All samples of the lane's pixel, in packets of sixteen; `samples` of all of its light.
@@ -74,19 +82,20 @@ void traceEdge(const Tracing& tracing, const Block& block, std::size_t lane, int
   }
   clearSums(sums);
   Packet packet;
+  Hits hits;
   for (int first = 0; first < all; first += batch) {
     const int last = std::min(all, first + batch);
     clearSums(sums.of_packet);
     for (int sample = first; sample < last; sample += shape.samples) {
       preparePacket(tracing, pixel, packet);
       startAtPlaces(tracing, pixel, sample, last, packet);
-      traceDirect(tracing, packet, sums.of_packet);
+      traceDirect(tracing, packet, hits, sums.of_packet);
     }
     foldTogether(static_cast<std::size_t>(tracing.request.harmonics), last - first, sums);
   }
 }
 
-bool differ(const std::array<const Seen*, 4>& corners) {
+bool differ(const Corners& corners) {
   constexpr float kAlike = 0.25f;  // of the brightest: what a slanted or distant surface may vary by
   float brightest = 0.0f, most = 0.0f;
   for (const Seen* one : corners) {
@@ -97,32 +106,63 @@ bool differ(const std::array<const Seen*, 4>& corners) {
   return most > kAlike * brightest;
 }
 
+/// Of a tile's pixels, beside that of one as bright as the tile's brightest corner: the mean of 1 / |light|².
+struct RangeVariance {
+  double sum = 0.0;
+  int pixels = 0;
+
+  /// Direct light anywhere between the corners' least and most, as an edge or a slope leaves it: with even odds the mean
+  /// of 1 / light² is one over their product.
+  void add(const Corners& corners, float brightest) {
+    constexpr double kIndirect = 0.125;  // of direct light: what other surfaces add everywhere, as in rooms
+    double least = brightest, most = -1.0;
+    for (const Seen* corner : corners) {
+      if (corner->lit < 0.0f) continue;
+      least = std::min(least, static_cast<double>(corner->lit));
+      most = std::max(most, static_cast<double>(corner->lit));
+    }
+    if (!(most >= 0.0 && brightest > 0.0f)) return;
+    const auto light = [&](double lit) { return (lit / double{brightest} + kIndirect) / (1.0 + kIndirect); };
+    sum += 1.0 / (light(least) * light(most));
+    ++pixels;
+  }
+  /// Nine at the most.
+  [[nodiscard]] int times() const { return pixels == 0 ? 1 : static_cast<int>(std::lround(std::sqrt(sum / pixels))); }
+};
+
 }  // namespace
 
-std::array<Lanes<int>, Tile::kBlocks> edgesOf(const Tracing& tracing, const Tile& tile) {
-  constexpr int kSide = Tile::kBlockShape.width;
-  std::array<Lanes<int>, Tile::kBlocks> edges{};
-  if (tracing.request.pixel_extent == 0.0) return edges;
+void lookAtCorners(const Tracing& tracing, Tile& tile) {
+  tile.edges = {};
+  tile.times = 1;
+  if (tracing.request.pixel_extent == 0.0) return;
   LaneSums sums{tracing.turns_per_metre.size() * static_cast<std::size_t>(tracing.request.harmonics)};
+  const int left = tile.blocks[0].x, top = tile.blocks[0].y;
   std::array<std::array<Seen, kLaneCount>, kCornerBlocks * kCornerBlocks> seen;
   for (int b = 0; b < kCornerBlocks * kCornerBlocks; ++b) {
-    seeCorners(tracing, tile.blocks[0].x + b % kCornerBlocks * kSide, tile.blocks[0].y + b / kCornerBlocks * kSide, sums,
+    seeCorners(tracing, left + b % kCornerBlocks * kBlockSide, top + b / kCornerBlocks * kBlockSide, sums,
                seen[static_cast<std::size_t>(b)]);
   }
   const auto at = [&](int column, int row) {
-    return &seen[static_cast<std::size_t>(row / kSide * kCornerBlocks + column / kSide)]
-                [static_cast<std::size_t>(row % kSide * kSide + column % kSide)];
+    return &seen[static_cast<std::size_t>(row / kBlockSide * kCornerBlocks + column / kBlockSide)]
+                [static_cast<std::size_t>(row % kBlockSide * kBlockSide + column % kBlockSide)];
   };
-  for (std::size_t b = 0; b < edges.size(); ++b) {
+  float brightest = 0.0f;
+  for (int i = 0; i < (kSide + 1) * (kSide + 1); ++i)
+    brightest = std::max(brightest, at(i % (kSide + 1), i / (kSide + 1))->lit);
+  RangeVariance variance;
+  for (std::size_t b = 0; b < tile.edges.size(); ++b) {
     const Block& block = tile.blocks[b];
     for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const int column = block.x - tile.blocks[0].x + static_cast<int>(i) % kSide,
-                row = block.y - tile.blocks[0].y + static_cast<int>(i) / kSide;
-      const bool is_edge = differ({at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)});
-      edges[b][i] = is_edge && block.is_inside[i] != 0 ? -1 : 0;
+      if (block.is_inside[i] == 0) continue;
+      const int column = block.x - left + static_cast<int>(i) % kBlockSide,
+                row = block.y - top + static_cast<int>(i) / kBlockSide;
+      const Corners corners{at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)};
+      tile.edges[b][i] = differ(corners) ? -1 : 0;
+      variance.add(corners, brightest);
     }
   }
-  return edges;
+  tile.times = variance.times();
 }
 
 void addEdges(const Tracing& tracing, const Block& block, const Lanes<int>& edges, int samples, BlockMeans& means) {

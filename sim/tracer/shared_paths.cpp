@@ -379,7 +379,7 @@ void prepareTile(const Tracing& tracing, int x, int y, Tile& tile) {
   const PixelKey corner =
       pixelKey(tracing.seed, static_cast<std::uint32_t>(x), static_cast<std::uint32_t>(y));
   tile.key = salted(corner, kTileSalt);
-  tile.edges = edgesOf(tracing, tile);
+  lookAtCorners(tracing, tile);
 }
 
 void traceTile(const Tracing& tracing, const Tile& tile, int first, int last, int batch, TileSums& sums) {

@@ -21,6 +21,7 @@ struct Tile {
   static constexpr BlockShape kBlockShape{.width = 4, .height = 4, .samples = 1};
   std::array<Block, kBlocks> blocks;
   std::array<Lanes<int>, kBlocks> edges;  ///< −1 where direct light is gathered by itself (edge_pixels.h)
+  int times;  ///< the request's samples are taken so many times where light is uneven (edge_pixels.h)
   PixelKey key;  ///< of all random numbers after the first surface: they are spread evenly over the tile
 };
 using TileSums = std::vector<BlockSums>;  ///< of each block

@@ -104,7 +104,7 @@ int samplesFor(const Tracing& tracing, const Block& block, BlockSums& sums, Bloc
   takeMeans(sums, tracing.request.harmonics, means);
   NoiseCount noise;
   countNoise(tracing, block.shape, sums, means, noise);
-  return samplesFor(tracing.request, noise, kPilot);
+  return samplesFor(tracing.request.wanted_noise, noise, kPilot, most);
 }
 
 /// Traces the block and takes the means of its pixels.

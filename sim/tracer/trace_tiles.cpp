@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <limits>
 
 #include "sim/images/rows.h"
 #include "sim/tracer/edge_pixels.h"
@@ -45,10 +46,12 @@ void takeMeans(const Tracing& tracing, const Tile& tile, std::size_t b, const Bl
   if (isAny(tile.edges[b])) addEdges(tracing, tile.blocks[b], tile.edges[b], samples, means);
 }
 
-/// How many samples the tile's pixels take: trace.cpp has the same for a block.
+/// How many samples the tile's pixels take: those of the request as many times as the light asks for, or fewer for a
+/// wanted noise. trace.cpp has the same for a block.
 int samplesFor(const Tracing& tracing, const Tile& tile, TileSums& sums, BlockMeans& means) {
   constexpr int kPilot = 16;
-  const int most = tracing.request.samples_per_pixel;
+  constexpr int kMost = std::numeric_limits<int>::max();
+  const int most = tile.times * std::min(tracing.request.samples_per_pixel, kMost / tile.times);
   if (!(tracing.request.wanted_noise > Length{}) || most <= kPilot) return most;
   Tile pilot = tile;
   for (Block& block : pilot.blocks) block = pilotOf(block);
@@ -59,7 +62,7 @@ int samplesFor(const Tracing& tracing, const Tile& tile, TileSums& sums, BlockMe
     takeMeans(tracing, pilot, b, sums[b], kPilot, means);
     countNoise(tracing, Tile::kBlockShape, sums[b], means, noise);
   }
-  return samplesFor(tracing.request, noise, kPilot);
+  return samplesFor(tracing.request.wanted_noise, noise, kPilot, most);
 }
 
 /// Whether any of the block's pixels lies in the region.
