@@ -57,7 +57,7 @@ struct TraceRequest {
   std::vector<Frequency> frequencies;
   int harmonics = 1;
   std::vector<PathFunctions> gates;  ///< instead of frequencies (Light::phasors)
-  int samples_per_pixel = 16;
+  int samples_per_pixel = 16;  ///< Shared: up to nine times as many in tiles whose light is uneven
   /// Positive: only as many samples as leave this noise of the range at the highest frequency, as the root mean
   /// square over a tile of 8 × 8 pixels (Shared) or of the pixel; `samples_per_pixel` is then the most.
   Length wanted_noise{};
