@@ -235,12 +235,13 @@ TEST(SharedSampler, KnowsPixelsAcrossEdgesByMoreDirectLight) {
   std::cout << edges << " pixels across edges: " << of_even / of_shared << " times less variance\n";
 }
 
-/// A tile with the edge of a shadow in it: three columns of pixels lit, one across the edge, four dark but for light from
-/// other surfaces. By lookAtCorners() that is √((3 · 8 · 1 + 8 · 9 + 4 · 8 · 81) / 64), six times the samples, and a
-/// sixth of the variance. Where a pixel is its central ray alone nothing is looked at: next to that, a millionth of a
-/// pixel more sees the same places with the samples that its corners ask for. Each of 24 seeds states a variance by 15
-/// degrees of freedom or more, which the dark pixels of a tile have in common at worst: their ratio's standard deviation is
-/// √(4 / (24 · 15)), 11 %, and four of six are three of them away. Wholly lit, the tile beside it takes as many as ever.
+/// A tile with the edge of a shadow in it: three columns of pixels lit, one across the edge, four dark but for light
+/// from other surfaces. By lookAtCorners() that is √((3 · 8 · 1 + 8 · 9 + 4 · 8 · 81) / 64), six times the samples,
+/// and a sixth of the variance. Where a pixel is its central ray alone nothing is looked at: next to that, a
+/// millionth of a pixel more sees the same places with the samples that its corners ask for. Each of 24 seeds states
+/// a variance by 15 degrees of freedom or more, which the dark pixels of a tile have in common at worst: the standard
+/// deviation of their ratio is √(4 / (24 · 15)), 11 %, and four is three of them below six. The tile beside it, lit
+/// all over, takes as many samples as ever.
 TEST(SharedSampler, TakesMoreSamplesWhereLightIsUneven) {
   const Scene scene = sceneOf(R"(
     [[material]]
