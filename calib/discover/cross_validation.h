@@ -39,8 +39,9 @@ Difference against0(const Gain& gain);
 /// Whether a gain on captures that were not fitted to is no chance: two standard errors over captures. Or, since what
 /// only a few captures can show (those of a cold camera) varies between captures as much as it is, three captures'
 /// worth of it — the sum over its root of squares is √n where n captures carry it — and two standard errors of the
-/// noise, 2√gain each. One or two captures alone may have been bumped. A capture that says more than ten standard errors
-/// counts as one that says ten: that the coldest of five says three times as much as the next is no reason to doubt them.
+/// noise, 2√gain each. One or two captures alone may have been bumped. A capture that says more than ten standard
+/// errors counts as one that says ten: that the coldest of five says three times as much as the next is no reason to
+/// doubt them.
 bool holds(const Gain& gain);
 /// Whether what one says more than the other holds, and is so much.
 bool isMoreBy(double enough, const Gain& more, const Gain& less);

@@ -74,8 +74,8 @@ std::optional<std::size_t> crossedShape(const Context& context, std::vector<Expl
   std::vector<Explanation> crossed = judged(context, std::move(forms));
   const auto best = std::ranges::max_element(crossed, {}, [](const Explanation& e) { return e.gain.total; });
   if (best == crossed.end()) return std::nullopt;
-  // What is as good uncrossed is told uncrossed. A curve, the first waves of a series, and what light does to first order
-  // are right to some per cent; and the best of many is better than it is.
+  // What is as good uncrossed is told uncrossed. A curve, the first waves of a series, and what light does to first
+  // order are right to some per cent; and the best of many is better than it is.
   const bool is_exact = one.fitted.form.build != nullptr && one.fitted.group.terms.size() <= kTermsOfAFormula;
   const double shape = (is_exact ? 0.02 : 0.05) * best->gain.total;
   const double enough = std::max(luckOfTheBestOf(crossed.size()), shape);

@@ -20,8 +20,9 @@ std::vector<FittedForm> withItsLight(const Context& context, const FittedForm& f
 std::optional<std::size_t> lightShape(const Context& context, std::vector<Explanation>& all, std::size_t chosen);
 
 /// What moves the range and dims the light along one covariate moves poses, which the light ties down, and looks, as
-/// far as the range says, like a function of two: the place of the curve along that one, unless the chosen pair says
-/// more than the curve with its light (see isMoreThanParts). Nothing: it does.
+/// far as the range says, like a function of two. The place of what is told along that one, unless the chosen pair says
+/// more than a curve along it with the same of the light, by more than the best of all explanations does by chance.
+/// Nothing: it does, or neither half predicts by itself.
 std::optional<std::size_t> alongOne(const Context& context, const std::vector<Explanation>& all, std::size_t chosen);
 
 }  // namespace toftwin::discover

@@ -67,20 +67,44 @@ Gain gainOfSum(const Context& without, const Effect& effect, const Effect& more)
   return gainOfParts(without, parts);
 }
 
-/// The part without which the others predict other captures as well; of several the one that they miss least.
-std::optional<std::size_t> needlessPart(const Context& without, const std::vector<FittedForm>& parts) {
-  if (parts.size() < 2) return std::nullopt;
-  const Gain all = gainOfParts(without, parts);
+/// What stays at each pixel was learned from all captures, those that are held out, too: it says nothing of others.
+bool mayGo(const Context& without, const FittedForm& part) {
+  return std::ranges::all_of(part.group.terms,
+                             [&](const Term& term) { return without.source->errorFactor(term) == 1.0; });
+}
+
+/// The part without which the others predict other captures as `all` do; of several the one that they miss least.
+std::optional<std::size_t> needlessPart(const Context& without, const std::vector<FittedForm>& parts,
+                                        const Gain& all) {
+  if (parts.size() < 2 || !std::ranges::all_of(parts, [&](const FittedForm& part) { return mayGo(without, part); }))
+    return std::nullopt;
   std::optional<std::size_t> needless;
   double most = 0.0;
   for (std::size_t i = 0; i < parts.size(); ++i) {
     std::vector<FittedForm> others = parts;
     others.erase(others.begin() + static_cast<std::ptrdiff_t>(i));
     const Gain less = gainOfParts(without, others);
-    if (isMoreBy(luckOfTheBestOf(1), all, less) || (needless && less.total <= most)) continue;
+    if (isMoreBy(0.0, all, less) || (needless && less.total <= most)) continue;
     needless = i, most = less.total;
   }
   return needless;
+}
+
+/// What was said of it was said of parts that are gone.
+void tellAgain(Found& found, const Context& without, Effect& effect) {
+  if (effect.parts.size() == 1) {
+    const auto explanations = competeFor(without, effect.covariates);
+    if (const auto chosen = choose(explanations)) {
+      Effect again = effectOf(without, explanations, *chosen);
+      settle(found, again);
+      again.p = effect.p;
+      effect = std::move(again);
+      return;
+    }
+  }
+  const Gain gain = gainOfParts(without, effect.parts);
+  effect.gain = against0(gain), effect.gain.mean = gain.total, effect.predicts = holds(gain);
+  effect.tried.clear(), effect.alternatives.clear(), effect.experiment.reset();
 }
 
 }  // namespace
@@ -106,13 +130,17 @@ void reshape(Found& found, Effect& effect, const Effect& more) {
 
 void dropNeedlessParts(Found& found) {
   for (Effect& effect : found.effects) {
+    if (effect.parts.size() < 2) continue;
     const Context without = knowingOnly(found, othersThan(found, effect));
-    while (const auto needless = needlessPart(without, effect.parts)) {
+    const Gain all = gainOfParts(without, effect.parts);
+    const std::size_t before = effect.parts.size();
+    while (const auto needless = needlessPart(without, effect.parts, all)) {
       std::vector<FittedForm> parts = std::move(effect.parts);
       parts.erase(parts.begin() + static_cast<std::ptrdiff_t>(*needless));
       effect.parts.clear(), effect.covariates.clear(), effect.stage = parts.front().group.terms.front().stage;
       for (FittedForm& part : parts) addPart(effect, partOf(std::move(part)));
     }
+    if (effect.parts.size() < before) tellAgain(found, without, effect);
   }
 }
 

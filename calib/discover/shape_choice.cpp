@@ -21,8 +21,8 @@ Set sorted(Set names) {
   return names;
 }
 
-/// What curves of this set of covariates are multiplied with, where it is the same for all terms of one: a
-/// carrier, or several of one name.
+}  // namespace
+
 std::vector<const Term*> carriersAlong(const Context& context, const Set& set) {
   std::vector<const Term*> carriers;
   for (const TermGroup& group : context.generic) {
@@ -36,6 +36,8 @@ std::vector<const Term*> carriersAlong(const Context& context, const Set& set) {
   }
   return carriers;
 }
+
+namespace {
 
 /// The formulas of a covariate, for what light does along it: as likely as for the range.
 std::vector<Form> carriedForms(const Context& context, const Set& set) {
@@ -336,7 +338,8 @@ std::vector<std::size_t> eligible(const std::vector<Explanation>& all) {
 
 namespace {
 
-/// One that is not rare; fewer covariates; then fewer numbers; of as many, a straight line, which says least; else what explains more.
+/// One that is not rare; fewer covariates; then fewer numbers; of as many, a straight line, which says least; else what
+/// explains more.
 bool isSimpler(const Explanation& one, const Explanation& other) {
   const auto isStraight = [](const Explanation& e) {
     const auto& terms = e.fitted.group.terms;
@@ -399,7 +402,8 @@ std::optional<std::size_t> choose(const std::vector<Explanation>& all) {
     if (all[i].is_catalogue || !(is_same || is_form || isLess(all[i]))) continue;
     const double by = all[*best].gain.total - all[i].gain.total;
     const double error = std::max(difference(all[*best].gain, all[i].gain).error, kRounding * all[*best].gain.total);
-    // The simulator has the simpler form, and many cameras have what is not rare: taken unless the data tell the two apart.
+    // The simulator has the simpler form, and many cameras have what is not rare: taken unless the data tell the two
+    // apart.
     const bool is_likelier = all[*best].fitted.group.is_rare && !all[i].fitted.group.is_rare;
     if (by > (is_form || is_likelier ? 2.0 : 1.0) * error) continue;
     if (isSimpler(all[i], all[chosen])) chosen = i;

@@ -54,6 +54,10 @@ bool isMoreThanParts(const Gain& together, const Gain& parts);
 /// Nothing where it is no covariate, but what a source calls a carrier.
 const CovariateInfo* infoOf(const Context& context, const std::string& name);
 
+/// What curves of this set of covariates, sorted, are multiplied with, where it is the same for all terms of one: a
+/// carrier, or several of one name.
+std::vector<const Term*> carriersAlong(const Context& context, const std::vector<std::string>& covariates);
+
 /// Columns of the nuisances and of what is known, in evidence that was made with `extra` more groups, the
 /// known ones first.
 Columns modelOf(const Context& context, const Marginal& marginal, std::size_t extra);

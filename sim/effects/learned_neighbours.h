@@ -29,7 +29,7 @@ struct LearnedNeighbours {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.numbers("reaches_px", reaches_px, {0.0, 1e6}, "r of each square, whole pixels; none: nothing is done");
+    v.numbers("reaches_px", reaches_px, {0.0, 1e6}, "r of each square, whole pixels; none: no squares");
     v.numbers("shares_percent", shares_percent, {-100.0, 100.0}, "s of each square");
     v.number("row_percent", row_percent, {-100.0, 100.0}, "s of the pixel's row");
     v.number("column_percent", column_percent, {-100.0, 100.0}, "s of its column");

@@ -43,20 +43,42 @@ TEST(LightShape, WhatIsTooFaintToTellIsNotCalledLight) {
   EXPECT_EQ(called, 0);
 }
 
-/// The place of what is told where a pair was chosen, a curve along `a` being the other choice; 0: the pair.
-std::size_t toldOfAPair(const TwoCovariates::Hidden& hidden) {
-  const Context context = contextOf(hidden, 1);
-  const std::vector<Explanation> all =
-      judged(context, {formOf("a b", {powerOf("a", 1.0), powerOf("b", 1.0)}), formOf("a", {powerOf("a", 1.0)})});
-  return alongOne(context, all, 0).value_or(0);
+/// What is told where a b + a was chosen, a curve along `a` being the other choice. The share by which a delay moves
+/// rows goes with b by four fifths.
+struct OfAPair {
+  std::size_t place = 0;  ///< 0: the pair; 1: the curve
+  std::vector<Explanation> all;
+};
+OfAPair toldOfAPair(const TwoCovariates::Hidden& hidden, std::uint64_t seed) {
+  const Context context = contextOf(hidden, seed, 0.8);
+  OfAPair told{.all = judged(context, {pairOf(), formOf("a", {powerOf("a", 1.0)})})};
+  told.place = alongOne(context, told.all, 0).value_or(0);
+  return told;
 }
 
+/// The pair says more than the curve by itself, 10² Σ a² (delay − mean)² = 100 × 2000/3 × 0.5²/12 × 0.68 = 944 in χ².
 TEST(LightShape, APairThatSaysNoMoreThanACurveWithItsLightIsThatCurve) {
-  EXPECT_EQ(toldOfAPair([](double a, double b, double delay) { return 10.0 * a * (delay + 0.1 * b); }), 1U);
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const OfAPair told = toldOfAPair([](double a, double, double delay) { return 10.0 * a * delay; }, seed);
+    EXPECT_TRUE(isMoreBy(100.0, told.all[0].gain, told.all[1].gain)) << "seed " << seed;
+    EXPECT_EQ(told.place, 1U) << "seed " << seed;
+  }
 }
 
+/// By 280 ± 35 in χ² more than the curve with its light, which is less than a twentieth of what it says.
 TEST(LightShape, APairThatSaysMoreStaysOne) {
-  EXPECT_EQ(toldOfAPair([](double a, double b, double delay) { return 10.0 * a * (0.1 * delay + b); }), 0U);
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    const OfAPair told = toldOfAPair([](double a, double b, double) { return 10.0 * a * (b - 0.3); }, seed);
+    EXPECT_EQ(told.place, 0U) << "seed " << seed;
+  }
+}
+
+/// A curve that predicts nothing by itself, as its light hides it, would end the search: then the pair is told.
+TEST(LightShape, ACurveThatPredictsNothingIsNotTold) {
+  const Context context = contextOf([](double a, double, double delay) { return 10.0 * a * (delay - 1.25); }, 1, 1.0);
+  const std::vector<Explanation> all = judged(context, {pairOf(), formOf("a", {powerOf("a", 1.0)})});
+  ASSERT_FALSE(holds(all[1].gain));
+  EXPECT_FALSE(alongOne(context, all, 0));
 }
 
 }  // namespace

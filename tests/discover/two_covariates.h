@@ -16,11 +16,13 @@ class TwoCovariates final : public RowSource {
  public:
   /// What a row has besides noise of 1: of a, b and by how much a delay moves it, all at random.
   using Hidden = std::function<double(double a, double b, double delay)>;
-  TwoCovariates(const Hidden& hidden, std::uint64_t seed) {
+  /// `with_b`: how much of the delay's share goes with b, 0 to 1.
+  TwoCovariates(const Hidden& hidden, std::uint64_t seed, double with_b = 0.0) {
     std::mt19937_64 bits{seed};
     const auto uniform = [&] { return static_cast<double>(bits() >> 11) * 0x1p-53; };
     for (int i = 0; i < kCaptures * kRows; ++i) {
-      Row row{.a = uniform(), .b = uniform(), .delay = 1.0 + 0.5 * uniform()};
+      Row row{.a = uniform(), .b = uniform()};
+      row.delay = 1.0 + 0.5 * (with_b * row.b + (1.0 - with_b) * uniform());
       for (int k = 0; k < 12; ++k) row.y += uniform() - 0.5;  // near enough to normal, and the same everywhere
       row.y += hidden(row.a, row.b, row.delay);
       rows_.push_back(row);
@@ -70,9 +72,9 @@ class TwoCovariates final : public RowSource {
 };
 
 /// What can be said of them: curves of what a delay does along each.
-inline Context contextOf(const TwoCovariates::Hidden& hidden, std::uint64_t seed) {
+inline Context contextOf(const TwoCovariates::Hidden& hidden, std::uint64_t seed, double with_b = 0.0) {
   Context context;
-  context.source = context.original = std::make_shared<TwoCovariates>(hidden, seed);
+  context.source = context.original = std::make_shared<TwoCovariates>(hidden, seed, with_b);
   context.covariates = context.source->covariates();
   for (const CovariateInfo& covariate : context.covariates) {
     TermGroup delay = smoothIn(covariate, kSmoothKnots);
@@ -85,6 +87,12 @@ inline Context contextOf(const TwoCovariates::Hidden& hidden, std::uint64_t seed
 inline FittedForm formOf(std::string name, std::vector<Factor> factors) {
   FittedForm form;
   form.group = {std::move(name), Kind::Generic, {{.factors = std::move(factors), .stage = Stage::Range}}, 0};
+  return form;
+}
+/// a b + a, which looks like a curve over a with its light where a delay's share goes with b.
+inline FittedForm pairOf() {
+  FittedForm form = formOf("a b + a", {{"a", Shape::Power, {1.0}}, {"b", Shape::Power, {1.0}}});
+  form.group.terms.push_back({.factors = {{"a", Shape::Power, {1.0}}}, .stage = Stage::Range});
   return form;
 }
 inline Factor powerOf(std::string covariate, double power) { return {std::move(covariate), Shape::Power, {power}}; }

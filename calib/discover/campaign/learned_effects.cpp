@@ -129,7 +129,15 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
       if (dims) learned.gains_percent.push_back(within(along.sum(changesGain, at), -100.0, 1e4));
     }
   }
-  if (std::ranges::any_of(over, onlyLightKnows)) return inLight(std::move(learned), has_phasors);
+  // What a delay does to the range is not the same everywhere, where waveforms make it another thing.
+  const bool is_delay = std::ranges::all_of(along.terms, [](const auto& one) {
+    return !movesRange(one.first) || one.first.carrier == kDelayCarrier;
+  });
+  const bool needs_light = std::ranges::any_of(over, onlyLightKnows);
+  if (needs_light || (moves && is_delay)) {
+    auto light = inLight(learned, has_phasors);
+    if (light || needs_light) return light;
+  }
   return learned;
 }
 
