@@ -84,6 +84,7 @@ inline Context contextOf(const TwoCovariates::Hidden& hidden, std::uint64_t seed
   return context;
 }
 
+inline Factor powerOf(std::string covariate, double power) { return {std::move(covariate), Shape::Power, {power}}; }
 inline FittedForm formOf(std::string name, std::vector<Factor> factors) {
   FittedForm form;
   form.group = {std::move(name), Kind::Generic, {{.factors = std::move(factors), .stage = Stage::Range}}, 0};
@@ -91,10 +92,9 @@ inline FittedForm formOf(std::string name, std::vector<Factor> factors) {
 }
 /// a b + a, which looks like a curve over a with its light where a delay's share goes with b.
 inline FittedForm pairOf() {
-  FittedForm form = formOf("a b + a", {{"a", Shape::Power, {1.0}}, {"b", Shape::Power, {1.0}}});
-  form.group.terms.push_back({.factors = {{"a", Shape::Power, {1.0}}}, .stage = Stage::Range});
+  FittedForm form = formOf("a b + a", {powerOf("a", 1.0), powerOf("b", 1.0)});
+  form.group.terms.push_back({.factors = {powerOf("a", 1.0)}, .stage = Stage::Range});
   return form;
 }
-inline Factor powerOf(std::string covariate, double power) { return {std::move(covariate), Shape::Power, {power}}; }
 
 }  // namespace toftwin::discover

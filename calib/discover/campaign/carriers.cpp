@@ -206,9 +206,8 @@ std::vector<TermGroup> carrierGroups(std::span<const CovariateInfo> covariates, 
   groups.push_back({"light from the row and the column",
                     Kind::Generic,
                     {{{}, Stage::Light, std::string{kAlongRow}}, {{}, Stage::Light, std::string{kAlongColumn}}},
-                    0,
-                    {},
-                    true});
+                    0});
+  groups.back().is_rare = true;
   TermGroup ghost{"light from the mirrored place", Kind::Generic, {}, 0};
   for (const int reach : kMirroredReaches) ghost.terms.push_back({{}, Stage::Light, mirroredName(reach)});
   for (const std::string_view carrier : {kMirroredRight, kMirroredDown})

@@ -56,11 +56,11 @@ bool isOnlyDelay(const Declared& declared, const sim::AnyEffect& effect);
 /// Whether it can be told from an offset of the range: its changes vary by more than 2 % of themselves.
 bool isNoOffset(std::span<const Reading> changes);
 
+/// Pixels of a row, or of a column, share wires: what of their mean comes along them.
+inline constexpr std::string_view kAlongRow = "neighbours:row", kAlongColumn = "neighbours:column";
 /// Half width in pixels of the square that light comes from, of a carrier "neighbours:…"; of the whole image:
 /// more than any image has. Nothing of other carriers.
 std::optional<int> reachOfNeighbours(std::string_view carrier);
-/// Pixels of a row, or of a column, share wires: what of their mean comes along them.
-inline constexpr std::string_view kAlongRow = "neighbours:row", kAlongColumn = "neighbours:column";
 /// The same of a carrier "mirrored:…".
 std::optional<int> reachOfMirrored(std::string_view carrier);
 /// Where the point that the image is turned about moves, right and down in pixels, as such a carrier's coefficient grows
