@@ -146,6 +146,15 @@ class Search {
       withdraw(*doubtful);
       return true;
     }
+    for (Effect& known : found_.effects) {
+      auto one = asOne(found_, known, effect);
+      if (!one) continue;
+      if (one->name == known.name) return false;
+      settle(found_, *one);
+      known = *std::move(one);
+      estimate(*found_.context.source, found_.context.scales, found_.effects);
+      return true;
+    }
     settle(found_, effect);
     effect.p = p;
     const auto same = std::ranges::find_if(found_.effects, [&](const Effect& known) {

@@ -48,7 +48,7 @@ class Unwrapper {
   [[nodiscard]] Length unambiguousRange() const { return unambiguous_range_m_ * metre; }
 
  private:
-  std::vector<double> period_m_;  // λᵢ
+  std::vector<double> period_m_, per_m_;  // λᵢ, 1/λᵢ
   std::size_t highest_ = 0;
   int candidates_ = 1;
   double unambiguous_range_m_ = 0.0;

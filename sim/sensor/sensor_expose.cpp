@@ -316,29 +316,36 @@ Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint
 SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& moment,
                                           std::uint64_t seed, std::uint64_t frame, int region_x,
                                           int region_y, History before) const {
+  Exposed exposed = decoded(std::move(collected), moment, seed, frame, region_x, region_y, before);
+  exposed.range = finished(std::move(exposed.range), moment, seed, frame, region_x, region_y, before);
+  return exposed;
+}
+
+SensorModel::Exposed SensorModel::decoded(Samples collected, const Moment& moment, std::uint64_t seed,
+                                          std::uint64_t frame, int region_x, int region_y, History before) const {
   const Conditions now{moment, impl_->camera, region_x, region_y, before};
   const std::size_t count = exposureCount();
-  Exposed exposed;
-  if (count == 1) {
-    exposed = readOutOne(std::move(collected), 0, now, seed, frame);
-  } else {
-    std::vector<Samples> samples;
-    std::vector<RangeImage> ranges;
-    for (std::size_t e = 0; e < count; ++e) {
-      Conditions then = now;
-      Samples earlier;
-      if (before.collected != nullptr) {
-        earlier = samplesOfExposure(*before.collected, e, count);
-        then.before.collected = &earlier;
-      }
-      Exposed one = readOutOne(samplesOfExposure(collected, e, count), e, then, seed, frame);
-      samples.push_back(std::move(one.samples));
-      ranges.push_back(std::move(one.range));
+  if (count == 1) return readOutOne(std::move(collected), 0, now, seed, frame);
+  std::vector<Samples> samples;
+  std::vector<RangeImage> ranges;
+  for (std::size_t e = 0; e < count; ++e) {
+    Conditions then = now;
+    Samples earlier;
+    if (before.collected != nullptr) {
+      earlier = samplesOfExposure(*before.collected, e, count);
+      then.before.collected = &earlier;
     }
-    exposed = {joinExposures(samples), mergeExposures(ranges)};
+    Exposed one = readOutOne(samplesOfExposure(collected, e, count), e, then, seed, frame);
+    samples.push_back(std::move(one.samples));
+    ranges.push_back(std::move(one.range));
   }
-  exposed.range = applyAll(std::move(exposed.range), impl_->effects, now, seed, frame);
-  return exposed;
+  return {joinExposures(samples), mergeExposures(ranges)};
+}
+
+RangeImage SensorModel::finished(RangeImage decoded, const Moment& moment, std::uint64_t seed, std::uint64_t frame,
+                                 int region_x, int region_y, History before) const {
+  const Conditions now{moment, impl_->camera, region_x, region_y, before};
+  return applyAll(std::move(decoded), impl_->effects, now, seed, frame);
 }
 
 SensorModel::Exposed SensorModel::readOutOne(Samples collected, std::size_t exposure,

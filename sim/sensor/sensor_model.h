@@ -113,6 +113,12 @@ class SensorModel {
   [[nodiscard]] Exposed readOut(Samples collected, const Moment& moment, std::uint64_t seed,
                                 std::uint64_t frame, int region_x = 0, int region_y = 0,
                                 History before = {}) const;
+  /// readOut() in its two halves, so that what acts on ranges alone can be varied: the range before any effect on
+  /// ranges, and what they make of it.
+  [[nodiscard]] Exposed decoded(Samples collected, const Moment& moment, std::uint64_t seed, std::uint64_t frame,
+                                int region_x = 0, int region_y = 0, History before = {}) const;
+  [[nodiscard]] RangeImage finished(RangeImage decoded, const Moment& moment, std::uint64_t seed, std::uint64_t frame,
+                                    int region_x = 0, int region_y = 0, History before = {}) const;
   /// Whether collect() gives the same for every frame of one light, exposure and ambient
   /// illuminance.
   [[nodiscard]] bool collectsTheSameEachFrame() const;

@@ -16,12 +16,13 @@ class TwoCovariates final : public RowSource {
  public:
   /// What a row has besides noise of 1: of a, b and by how much a delay moves it, all at random.
   using Hidden = std::function<double(double a, double b, double delay)>;
-  /// `with_b`: how much of the delay's share goes with b, 0 to 1.
-  TwoCovariates(const Hidden& hidden, std::uint64_t seed, double with_b = 0.0) {
+  /// `with_b`: how much of the delay's share goes with b; `alike`: how much of b goes with a; 0 to 1.
+  TwoCovariates(const Hidden& hidden, std::uint64_t seed, double with_b = 0.0, double alike = 0.0) {
     std::mt19937_64 bits{seed};
     const auto uniform = [&] { return static_cast<double>(bits() >> 11) * 0x1p-53; };
     for (int i = 0; i < kCaptures * kRows; ++i) {
       Row row{.a = uniform(), .b = uniform()};
+      row.b = alike * row.a + (1.0 - alike) * row.b;
       row.delay = 1.0 + 0.5 * (with_b * row.b + (1.0 - with_b) * uniform());
       for (int k = 0; k < 12; ++k) row.y += uniform() - 0.5;  // near enough to normal, and the same everywhere
       row.y += hidden(row.a, row.b, row.delay);
@@ -72,9 +73,10 @@ class TwoCovariates final : public RowSource {
 };
 
 /// What can be said of them: curves of what a delay does along each.
-inline Context contextOf(const TwoCovariates::Hidden& hidden, std::uint64_t seed, double with_b = 0.0) {
+inline Context contextOf(const TwoCovariates::Hidden& hidden, std::uint64_t seed, double with_b = 0.0,
+                         double alike = 0.0) {
   Context context;
-  context.source = context.original = std::make_shared<TwoCovariates>(hidden, seed, with_b);
+  context.source = context.original = std::make_shared<TwoCovariates>(hidden, seed, with_b, alike);
   context.covariates = context.source->covariates();
   for (const CovariateInfo& covariate : context.covariates) {
     TermGroup delay = smoothIn(covariate, kSmoothKnots);

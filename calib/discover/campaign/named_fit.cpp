@@ -214,15 +214,17 @@ std::shared_ptr<const RowSource> CampaignRows::including(std::span<const NamedFi
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
       CaptureRows& rows = all->rows_[c];
       const Fixed& fixed = *rows.fixed;
-      const Reading reading = read(*here, c, on_light);
+      const StagedReading staged = read(*here, c, on_light);
+      const Reading& reading = staged.reading();
       for (std::size_t k = 0; k < kChannels; ++k) {
         if (rows.base.columns[k].size() != 0)
           rows.base.columns[k].conservativeResize(Eigen::NoChange, static_cast<Eigen::Index>(next));
       }
       rows.base.putResidual(fixed.cells, fixed.residual, fixed.varied, reading);
-      if (has_delay_) rows.base.putDelay(fixed.cells, reading, read(*late, c, on_light));
+      if (has_delay_) rows.base.putDelay(fixed.cells, reading, staged.by(*late, Stage::Light));
       for (std::size_t i = 0; i < free.size(); ++i)
-        rows.base.putChange(fixed.cells, declared_columns + i, reading, read(cameras[i], c, on_light));
+        rows.base.putChange(fixed.cells, declared_columns + i, reading,
+                            staged.by(cameras[i], stageOf(all->effects_[free[i].place])));
       rows.evidence = with_catalogue ? ownEvidence(rows) : rows.base.evidence(fixed.name, fixed.block);
     }
   });

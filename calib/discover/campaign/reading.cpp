@@ -171,6 +171,32 @@ Reading NoiselessCamera::read(const MeasuredCapture& capture, const sim::Samples
   return asReading(exposed.range);
 }
 
+Reading NoiselessCamera::read(const MeasuredCapture& capture, const sim::RangeImage& decoded) const {
+  const sim::SensorModel& model = at(capture);
+  return asReading(model.finished(decoded, momentFor(model, capture), 0, 0));
+}
+
+sim::RangeImage NoiselessCamera::decode(const MeasuredCapture& capture, const sim::Samples& collected) const {
+  const sim::SensorModel& model = at(capture);
+  return model.decoded(collected, momentFor(model, capture), 0, 0).range;
+}
+
+bool NoiselessCamera::remembers() const { return models_.at(0.0).remembers(); }
+
+StagedReading::StagedReading(const NoiselessCamera& camera, const MeasuredCapture& capture, const sim::Light& light,
+                             std::shared_ptr<const sim::Samples> collected)
+    : capture_(capture), light_(light), collected_(std::move(collected)) {
+  if (collected_ == nullptr) collected_ = std::make_shared<const sim::Samples>(camera.collect(capture, light));
+  if (!camera.remembers()) decoded_ = camera.decode(capture, *collected_);
+  reading_ = decoded_ ? camera.read(capture, *decoded_) : camera.read(capture, *collected_);
+}
+
+Reading StagedReading::by(const NoiselessCamera& other, Stage from) const {
+  if (from == Stage::Light) return other.read(capture_, light_);
+  if (from == Stage::Range && decoded_ && !other.remembers()) return other.read(capture_, *decoded_);
+  return other.read(capture_, *collected_);
+}
+
 RawReading NoiselessCamera::readRaw(const MeasuredCapture& capture, const sim::Light& light) const {
   const sim::SensorModel& model = at(capture);
   return rawReadingOf(model.readOut(collect(capture, light), momentFor(model, capture), 0, 0).samples);

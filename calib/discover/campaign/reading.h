@@ -2,11 +2,13 @@
 #pragma once
 
 #include <map>
+#include <memory>
 #include <optional>
 
 #include <toftwin/result.h>
 
 #include "calib/discover/campaign/campaign.h"
+#include "calib/discover/evidence.h"
 
 namespace toftwin::discover {
 
@@ -40,15 +42,42 @@ class NoiselessCamera {
   [[nodiscard]] Reading read(const MeasuredCapture& capture, const sim::Light& light) const;
   /// The same from what the pixels collected, where that is known already.
   [[nodiscard]] Reading read(const MeasuredCapture& capture, const sim::Samples& collected) const;
+  /// And from the ranges that were made of it; the camera must not remember.
+  [[nodiscard]] Reading read(const MeasuredCapture& capture, const sim::RangeImage& decoded) const;
   /// What its raw exposures would say; the capture's must be known.
   [[nodiscard]] RawReading readRaw(const MeasuredCapture& capture, const sim::Light& light) const;
   [[nodiscard]] sim::Samples collect(const MeasuredCapture& capture, const sim::Light& light) const;
+  /// Before any effect on ranges.
+  [[nodiscard]] sim::RangeImage decode(const MeasuredCapture& capture, const sim::Samples& collected) const;
+  /// Whether what it says of a frame depends on the frame before.
+  [[nodiscard]] bool remembers() const;
 
  private:
   /// The model at the capture's exposure, which must be one of those that it was made for.
   [[nodiscard]] const sim::SensorModel& at(const MeasuredCapture& capture) const;
   std::map<double, sim::SensorModel>
       models_{};  ///< by exposure in microseconds; 0: the model's own
+};
+
+/// What a camera says of one capture's light, kept at each stage: another camera, whose effects differ from a later
+/// stage on, starts there. Capture and light must outlive it.
+class StagedReading {
+ public:
+  /// `collected`: by a camera with the same effects on light; null: it is made.
+  StagedReading(const NoiselessCamera& camera, const MeasuredCapture& capture, const sim::Light& light,
+                std::shared_ptr<const sim::Samples> collected = nullptr);
+
+  [[nodiscard]] const Reading& reading() const { return reading_; }
+  [[nodiscard]] const std::shared_ptr<const sim::Samples>& collected() const { return collected_; }
+  /// What the other camera says, whose effects differ at `from` and behind it.
+  [[nodiscard]] Reading by(const NoiselessCamera& other, Stage from) const;
+
+ private:
+  const MeasuredCapture& capture_;
+  const sim::Light& light_;
+  std::shared_ptr<const sim::Samples> collected_;
+  std::optional<sim::RangeImage> decoded_{};  ///< nothing where the camera remembers
+  Reading reading_{};
 };
 
 /// The amplitude's unit against the camera file's: what ln amplitude is larger by than declared, in percent, in the

@@ -27,9 +27,10 @@ namespace {
 /// What the simulation says with other effects than the declared ones.
 struct Variant {
   NoiselessCamera camera;
-  bool acts_on_light = false;
-  double step = 1.0;
+  Stage from = Stage::Light;  ///< where it begins to differ
 };
+
+Reading by(const StagedReading& base, const Variant& variant) { return base.by(variant.camera, variant.from); }
 
 std::vector<sim::AnyEffect> replaced(std::vector<sim::AnyEffect> effects, std::size_t place,
                                      const sim::AnyEffect& by) {
@@ -37,25 +38,11 @@ std::vector<sim::AnyEffect> replaced(std::vector<sim::AnyEffect> effects, std::s
   return effects;
 }
 
-/// A capture's simulation as declared on the light that effects are varied on, from which variants
-/// start.
-struct Base {
-  const MeasuredCapture& capture;
-  const sim::Light& light;
-  sim::Samples collected;
-  Reading reading;
-
-  [[nodiscard]] Reading with(const Variant& variant) const {
-    return variant.acts_on_light ? variant.camera.read(capture, light)
-                                 : variant.camera.read(capture, collected);
-  }
-};
-
 /// Changes of some pixels' readings in about a millimetre: of captures that differ most.
 class Probe {
  public:
   Probe(const Declared& declared, const std::vector<sim::AnyEffect>& effects,
-        const std::vector<MeasuredCapture>& captures, const std::vector<const Base*>& bases)
+        const std::vector<MeasuredCapture>& captures, const std::vector<const StagedReading*>& bases)
       : declared_(declared), effects_(effects), captures_(captures), bases_(bases) {}
 
   /// `declared_place`: of the effect among the declared ones that varies; past the end: it is
@@ -67,14 +54,13 @@ class Probe {
                                : withInserted(effects_, variation.on);
     const auto camera = NoiselessCamera::make(declared_.model, std::move(effects), captures_);
     if (!camera) return {};
-    const Variant variant{*camera, stageOf(variation.on) == Stage::Light, 1.0};
     std::vector<float> changes;
-    for (const Base* base : bases_) {
-      const Reading there = base->with(variant);
+    for (const StagedReading* base : bases_) {
+      const Reading there = base->by(*camera, stageOf(variation.on));
       const std::size_t count = there.range_m.size(), stride = 1 + count / kPixels;
       for (std::size_t i = 0; i < count; i += stride) {
-        const float range = 1e3F * (there.range_m[i] - base->reading.range_m[i]);
-        const float log = 1e2F * (there.log_amplitude[i] - base->reading.log_amplitude[i]);
+        const float range = 1e3F * (there.range_m[i] - base->reading().range_m[i]);
+        const float log = 1e2F * (there.log_amplitude[i] - base->reading().log_amplitude[i]);
         changes.push_back(std::isfinite(range) ? range : 0.0F);
         changes.push_back(std::isfinite(log) ? log : 0.0F);
       }
@@ -87,7 +73,7 @@ class Probe {
   const Declared& declared_;
   const std::vector<sim::AnyEffect>& effects_;
   const std::vector<MeasuredCapture>& captures_;
-  std::vector<const Base*> bases_;
+  std::vector<const StagedReading*> bases_;
 };
 
 /// Captures that between them change most of what can be changed.
@@ -153,15 +139,14 @@ Result<VariedEffect> variedOf(const Declared& declared, const std::vector<sim::A
                                           : withInserted(effects, variation.on),
                               captures);
     if (!camera) return camera.error();
-    varied.variants.push_back(
-        {*std::move(camera), stageOf(variation.on) == Stage::Light, variation.step});
+    varied.variants.push_back({*std::move(camera), stageOf(variation.on)});
   }
   return varied;
 }
 
 Result<Varied> varyAll(const Declared& declared, const std::vector<sim::AnyEffect>& effects,
                        const std::vector<MeasuredCapture>& captures,
-                       const std::vector<const Base*>& probed, std::vector<std::string> left_out) {
+                       const std::vector<const StagedReading*>& probed, std::vector<std::string> left_out) {
   const Probe probe{declared, effects, captures, probed};
   Varied all;
   const auto add = [&](Candidate candidate, std::size_t place) -> Result<> {
@@ -211,14 +196,15 @@ Reading delayed(const Reading& from, Reading to) {
 /// The camera with a delay in its light, where that is another thing than an offset of the range.
 Result<std::optional<Variant>> lateOf(const Declared& declared, const std::vector<sim::AnyEffect>& effects,
                                       const std::vector<MeasuredCapture>& captures,
-                                      const std::vector<const Base*>& probed) {
+                                      const std::vector<const StagedReading*>& probed) {
   if (!(periodOf(declared.model) > 0.0)) return std::optional<Variant>{};
   auto camera = NoiselessCamera::make(
       declared.model, withInserted(effects, delayInLight(declared.model, kDelay_mm)), captures);
   if (!camera) return camera.error();
-  std::optional<Variant> late{{*std::move(camera), true}};
+  std::optional<Variant> late{{*std::move(camera), Stage::Light}};
   std::vector<Reading> changes;
-  for (const Base* base : probed) changes.push_back(delayed(base->reading, base->with(*late)));
+  for (const StagedReading* base : probed)
+    changes.push_back(delayed(base->reading(), by(*base, *late)));
   if (!isNoOffset(changes)) late.reset();
   return late;
 }
@@ -233,7 +219,7 @@ Result<std::vector<Variant>> unequalCameras(const Declared& declared, const std:
     for (const sim::AnyEffect& unit : units) list = withInserted(std::move(list), unit);
     auto camera = NoiselessCamera::make(declared.model, std::move(list), captures);
     if (!camera) return camera.error();
-    cameras.push_back({*std::move(camera), actsOnLight(units)});
+    cameras.push_back({*std::move(camera), actsOnLight(units) ? Stage::Light : Stage::Samples});
   }
   return cameras;
 }
@@ -293,9 +279,8 @@ CampaignRows::PerChannel CampaignRows::Fixed::whitened(const Reading& change) co
   return columns;
 }
 
-Reading CampaignRows::read(const NoiselessCamera& camera, std::size_t c, bool acts_on_light) const {
-  return acts_on_light ? camera.read(lit_->captures[c], *lit_->varied[c])
-                       : camera.read(lit_->captures[c], rows_[c].fixed->collected);
+StagedReading CampaignRows::read(const NoiselessCamera& camera, std::size_t c, bool acts_on_light) const {
+  return {camera, lit_->captures[c], *lit_->varied[c], acts_on_light ? nullptr : rows_[c].fixed->collected};
 }
 
 Result<NoiselessCamera> CampaignRows::cameraWith(std::vector<sim::AnyEffect> effects) const {
@@ -307,16 +292,11 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   const std::vector<sim::AnyEffect> effects = declaredEffects(declared);
   const auto camera = NoiselessCamera::make(declared.model, effects, lit.captures);
   if (!camera) return camera.error();
-  const auto baseOf = [&](std::size_t c) {
-    const sim::Light& light = *lit.varied[c];
-    sim::Samples collected = camera->collect(lit.captures[c], light);
-    Reading reading = camera->read(lit.captures[c], collected);
-    return Base{lit.captures[c], light, std::move(collected), std::move(reading)};
-  };
-  std::vector<Base> probed;
+  const auto baseOf = [&](std::size_t c) { return StagedReading{*camera, lit.captures[c], *lit.varied[c]}; };
+  std::vector<StagedReading> probed;
   for (const std::size_t c : probedOf(lit.captures)) probed.push_back(baseOf(c));
-  std::vector<const Base*> probed_at;
-  for (const Base& base : probed) probed_at.push_back(&base);
+  std::vector<const StagedReading*> probed_at;
+  for (const StagedReading& base : probed) probed_at.push_back(&base);
   auto varied = varyAll(declared, effects, lit.captures, probed_at, options.left_out);
   if (!varied) return varied.error();
   const auto late = lateOf(declared, effects, lit.captures, probed_at);
@@ -324,7 +304,7 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
 
   CampaignRows all;
   if (!probed.empty() && declared.model.hasPhasors())
-    all.unequal_ = unequalExposures(probed.front().collected.steps, probed.front().collected.taps);
+    all.unequal_ = unequalExposures(probed.front().collected()->steps, probed.front().collected()->taps);
   const auto unequal = unequalCameras(declared, effects, lit.captures, all.unequal_);
   if (!unequal) return unequal.error();
   all.declared_ = &declared, all.lit_ = std::make_shared<const Lit>(lit), all.effects_ = effects;
@@ -356,10 +336,10 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
   std::atomic<std::size_t> done{0};
   sim::inParallel(static_cast<int>(lit.captures.size()), 1, [&](int first, int last) {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
-      Base base = baseOf(c);
+      const StagedReading base = baseOf(c);
       const Reading declared_reading = camera->read(lit.captures[c], lit.traced[c]->light);
       auto fixed = std::make_shared<Fixed>();
-      fixed->varied = base.reading, fixed->site = sites[c];
+      fixed->varied = base.reading(), fixed->site = sites[c];
       all.fillFixed(c, rates[c], declared_reading, *fixed);
       WhitenedCapture columns{fixed->cells, next};
       columns.putCommon(fixed->cells, *lit.traced[c]);
@@ -373,17 +353,16 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
       if (tiles) tiles->put(fixed->cells, lit.captures[c], first_tile, columns.columns);
       for (const VariedEffect& effect : varied->effects) {
         for (std::size_t i = 0; i < effect.variants.size(); ++i) {
-          columns.putChange(fixed->cells, effect.group.first + i, base.reading,
-                            base.with(effect.variants[i]));
+          columns.putChange(fixed->cells, effect.group.first + i, base.reading(), by(base, effect.variants[i]));
         }
       }
       if (*late) {
-        const Reading delayed_reading = base.with(**late);
-        fixed->carriers[std::string{kDelayCarrier}] = fixed->whitened(delayed(base.reading, delayed_reading));
-        columns.putDelay(fixed->cells, base.reading, delayed_reading);
+        const Reading delayed_reading = by(base, **late);
+        fixed->carriers[std::string{kDelayCarrier}] = fixed->whitened(delayed(base.reading(), delayed_reading));
+        columns.putDelay(fixed->cells, base.reading(), delayed_reading);
       }
       for (std::size_t u = 0; u < unequal->size(); ++u)
-        fixed->carriers[all.unequal_[u].first] = fixed->whitened(changeOf(base.reading, base.with((*unequal)[u])));
+        fixed->carriers[all.unequal_[u].first] = fixed->whitened(changeOf(base.reading(), by(base, (*unequal)[u])));
       CaptureRows& rows = all.rows_[c];
       const auto in_base = static_cast<Eigen::Index>(all.base_columns_);
       for (std::size_t k = 0; k < kChannels; ++k) {
@@ -392,7 +371,7 @@ Result<CampaignRows> CampaignRows::make(const Declared& declared, const Lit& lit
             columns.columns[k].rightCols(columns.columns[k].cols() - in_base);
         columns.columns[k].conservativeResize(Eigen::NoChange, in_base);
       }
-      fixed->collected = std::move(base.collected);
+      fixed->collected = base.collected();
       fixed->residual = columns.residual;
       rows.base = std::move(columns);
       rows.fixed = std::move(fixed);

@@ -205,7 +205,8 @@ class CampaignRows final : public RowSource, public NamedEffects {
     CaptureCovariates covariates;
     std::map<std::string, PerChannel> carriers{};
     std::array<Eigen::MatrixXf, kChannels> catalogue{};
-    sim::Samples collected;  ///< by the declared model, of the light on which effects are varied
+    /// By the declared model, of the light on which effects are varied.
+    std::shared_ptr<const sim::Samples> collected;
     Reading varied;          ///< what it says of that light
     PerChannel residual;     ///< of the declared model
 
@@ -246,8 +247,8 @@ class CampaignRows final : public RowSource, public NamedEffects {
   [[nodiscard]] CaptureEvidence evidenceOf(const CaptureRows& rows,
                                            std::span<const TermGroup> extra,
                                            bool with_catalogue) const;
-  [[nodiscard]] Reading read(const NoiselessCamera& camera, std::size_t capture,
-                             bool acts_on_light) const;
+  /// `acts_on_light`: other light is collected than as declared.
+  [[nodiscard]] StagedReading read(const NoiselessCamera& camera, std::size_t capture, bool acts_on_light) const;
   [[nodiscard]] Result<NoiselessCamera> cameraWith(std::vector<sim::AnyEffect> effects) const;
 
   const Declared* declared_ = nullptr;

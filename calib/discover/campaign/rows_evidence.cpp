@@ -251,7 +251,7 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
     if (!camera) return camera.error();
     cameras.push_back(*std::move(camera));
   }
-  const bool on_light = actsOnLight(left.effects);
+  const bool on_light = actsOnLight(left.effects) || left.delay_mm != 0.0;
   Evidence evidence;
   const std::size_t own = left.with_numbers ? base_columns_ : common_columns_;
   for (const Group& group : groups_)
@@ -271,7 +271,8 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
     for (auto c = static_cast<std::size_t>(first); c < static_cast<std::size_t>(last); ++c) {
       const Fixed& fixed = *rows_[c].fixed;
       WhitenedCapture whitened{fixed.cells, first_free + left.free.size()};
-      const Reading reading = read(*here, c, on_light);
+      const StagedReading staged = read(*here, c, on_light);
+      const Reading& reading = staged.reading();
       const Terms terms = termsOf(rows_[c], left.terms);
       whitened.putResidual(fixed.cells, fixed.residual, fixed.varied, reading);
       for (std::size_t k = 0; k < kChannels; ++k) {
@@ -281,9 +282,10 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
         whitened.columns[k].middleCols(in_base, terms.count()) =
             terms.columnsFor(k, terms.channels[k].columns.cast<double>()).cast<float>();
       }
-      if (has_delay_) whitened.putDelay(fixed.cells, reading, read(*late, c, on_light));
+      if (has_delay_) whitened.putDelay(fixed.cells, reading, staged.by(*late, Stage::Light));
       for (std::size_t i = 0; i < cameras.size(); ++i)
-        whitened.putChange(fixed.cells, first_free + i, reading, read(cameras[i], c, on_light));
+        whitened.putChange(fixed.cells, first_free + i, reading,
+                           staged.by(cameras[i], stageOf(left.effects[left.free[i].place])));
       const auto numbers = static_cast<Eigen::Index>(left.free.size());
       for (std::size_t k = 0; k < kChannels; ++k) {
         if (whitened.columns[k].size() == 0) continue;
