@@ -305,6 +305,23 @@ TEST_F(Rows, HowStrongAPatternIsOtherPlacesSay) {
   EXPECT_NEAR(with.coefficient[last], 1.0, 4.0 * error);
 }
 
+/// The delay of the light, too, which no effect of this camera acts on.
+TEST_F(Rows, TheDeclaredEffectsLeaveWhatIsLeftAlready) {
+  const std::string all = smallCamera();
+  const Made made = make("", all.substr(0, all.find("[[effect]]")) + "[[effect]]\ntype = 'read_noise'\n" +
+                                 "[[effect]]\ntype = 'sample_gain'\ngain = 1.0\n");
+  ASSERT_TRUE(made.rows.hasDelay());
+  const Evidence as_made = made.rows.withoutCatalogue({});
+  const auto left = made.rows.evidenceLeft({.effects = made.rows.effects(), .with_numbers = true});
+  ASSERT_TRUE(left);
+  ASSERT_EQ(left->captures.size(), as_made.captures.size());
+  for (std::size_t c = 0; c < as_made.captures.size(); ++c) {
+    const CaptureEvidence &a = as_made.captures[c], &b = left->captures[c];
+    EXPECT_LT((a.gram - b.gram).norm(), 1e-5 * a.gram.norm());
+    EXPECT_LT((a.moment - b.moment).norm(), 1e-5 * a.moment.norm());
+  }
+}
+
 TEST(PixelPattern, IsKnownAsFarAsItsPixelsStandOutOfNoise) {
   const PixelPattern pattern{.deviation = 2.0, .weight = {1.0, 0.25}};  // four times its noise's variance, and once
   EXPECT_DOUBLE_EQ(pattern.knownShare(), (0.8 + 0.25 * 0.5) / 1.25);
