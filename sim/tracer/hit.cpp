@@ -130,8 +130,11 @@ struct PlaneLanes {
 
 bool isMissed(const RTCRayHit16& rays, std::size_t i) { return rays.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID; }
 
-TrianglePlane planeIn(const ObjectRow& row, unsigned primitive) {
-  return row.standing == nullptr ? row.planes[primitive] : placed(row.planes[primitive], *row.standing);
+/// Of a moving object it is made in `room`.
+TOFTWIN_INLINE const TrianglePlane& planeIn(const ObjectRow& row, unsigned primitive, TrianglePlane& room) {
+  const TrianglePlane& own = row.planes[primitive];
+  if (row.standing != nullptr) room = placed(own, *row.standing);
+  return row.standing == nullptr ? own : room;
 }
 
 TOFTWIN_INLINE void takeLane(const ObjectRow& row, const TrianglePlane& plane, std::size_t i, PlaneLanes& planes, Hits& hits) {
@@ -155,7 +158,8 @@ bool meetOneTriangle(const Scene::Impl& scene, const RTCRayHit16& rays, PlaneLan
   for (std::size_t i = 0; i < kLaneCount; ++i) differ |= (rays.hit.geomID[i] ^ object) | (rays.hit.primID[i] ^ primitive);
   if (differ != 0 || object == RTC_INVALID_GEOMETRY_ID) return false;
   const ObjectRow row = scene.rows[object];
-  const TrianglePlane plane = planeIn(row, primitive);
+  TrianglePlane room;
+  const TrianglePlane plane = planeIn(row, primitive, room);
   for (std::size_t i = 0; i < kLaneCount; ++i) takeLane(row, plane, i, planes, hits);
   return true;
 }
@@ -171,8 +175,8 @@ void gather(const Scene::Impl& scene, const RTCRayHit16& rays, PlaneLanes& plane
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const bool is_missed = isMissed(rays, i);
     const ObjectRow& row = is_missed ? scene.rows.back() : scene.rows[rays.hit.geomID[i]];
-    const TrianglePlane plane = planeIn(row, is_missed ? 0 : rays.hit.primID[i]);
-    takeLane(row, plane, i, planes, hits);
+    TrianglePlane room;
+    takeLane(row, planeIn(row, is_missed ? 0 : rays.hit.primID[i], room), i, planes, hits);
   }
 }
 
