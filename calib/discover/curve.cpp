@@ -78,14 +78,16 @@ std::pair<double, double> rowsAround(const TableData& rows, const std::string& c
           std::isfinite(around.second) ? around.second : place};
 }
 
-std::optional<std::pair<double, double>> rowsAround(const TableData& rows, const Effect& effect,
-                                                    std::size_t number) {
+std::optional<StepRows> stepRows(const TableData& rows, const Effect& effect, std::size_t number) {
   std::size_t next = effect.coefficient.size();
   for (const FittedForm& part : effect.parts) {
     const bool is_step = !part.group.terms.empty() && !part.group.terms[0].factors.empty() &&
                          part.group.terms[0].factors[0].shape == Shape::Step;
     for (std::size_t i = 0; i < part.inner.size(); ++i, ++next) {
-      if (next == number && is_step) return rowsAround(rows, part.form.covariates[0], part.inner[i]);
+      if (next != number || !is_step) continue;
+      const std::string& covariate = part.form.covariates[0];
+      const auto [below, from] = rowsAround(rows, covariate, part.inner[i]);
+      return StepRows{covariate, below, from};
     }
   }
   return std::nullopt;

@@ -32,9 +32,13 @@ std::vector<double> effectIn(const TableData& rows, const Effect& effect);
 
 /// The values of a covariate next to a place, below it and from it on: all that rows say of where a step is.
 std::pair<double, double> rowsAround(const TableData& rows, const std::string& covariate, double place);
-/// That of the number at this place of effect.numbers, if it is the place of a step.
-std::optional<std::pair<double, double>> rowsAround(const TableData& rows, const Effect& effect,
-                                                    std::size_t number);
+/// A step is between two rows.
+struct StepRows {
+  std::string covariate{};
+  double below = 0.0, from = 0.0;
+};
+/// Of the number at this place of effect.numbers, if it is the place of a step.
+std::optional<StepRows> stepRows(const TableData& rows, const Effect& effect, std::size_t number);
 
 /// "−5.1 · exp(−time_s/301)"; "smooth curve, see its table" where there is no formula.
 std::string formulaOf(const Effect& effect);

@@ -37,7 +37,7 @@ void addConfounded(TableData& data) {
     for (std::size_t j = 0; j < i; ++j) {
       const double r =
           ranks[i].dot(ranks[j]) / std::sqrt(ranks[i].squaredNorm() * ranks[j].squaredNorm() + 1e-300);
-      if (std::abs(r) < 0.9) continue;
+      if (std::abs(r) < kGoTogether) continue;
       data.doubts.push_back(
           fmt::format("{} and {} go together (rank correlation {:.2f}): what goes with one can "
                       "hardly be told from what goes with the other",

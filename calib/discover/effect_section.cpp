@@ -31,11 +31,10 @@ TableBlock numbersTable(const TableDiscovery& d, const Effect& effect) {
   if (!isFormula(effect)) return table;
   for (std::size_t i = 0; i < effect.numbers.size(); ++i) {
     const Estimate& one = effect.numbers[i];
-    const auto around = rowsAround(d.open, effect, i);
-    if (around && one.error < 0.5 * (around->second - around->first)) {
-      table.rows.push_back({one.name, "between two rows", "–",
-                            placeInWords(d, effect.covariates[0], around->first),
-                            placeInWords(d, effect.covariates[0], around->second)});
+    const auto step = stepRows(d.open, effect, i);
+    if (step && one.error < 0.5 * (step->from - step->below)) {
+      table.rows.push_back({one.name, "between two rows", "–", placeInWords(d, step->covariate, step->below),
+                            placeInWords(d, step->covariate, step->from)});
       continue;
     }
     table.rows.push_back({one.name, significant(one.value), significant(one.error),

@@ -6,6 +6,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/discover/cancelling_effects.h"
 #include "calib/discover/candidates.h"
 #include "calib/discover/crossed_shape.h"
 #include "calib/discover/estimate.h"
@@ -50,6 +51,7 @@ class Search {
     if (found_.effects.size() > 1) {
       revise(found_);
       prune(found_);
+      joinCancelling(found_);
       if (found_.context.original->named() != nullptr) markRests(found_);
     }
     finding_.nuisances = estimate(*found_.context.source, found_.context.scales, found_.effects);
@@ -144,15 +146,6 @@ class Search {
       const double enough = std::max(2.0 * effect.gain.error, 0.02 * found_.effects[*doubtful].gain.mean);
       if (effect.gain.mean < enough) return false;
       withdraw(*doubtful);
-      return true;
-    }
-    for (Effect& known : found_.effects) {
-      auto one = asOne(found_, known, effect);
-      if (!one) continue;
-      if (one->name == known.name) return false;
-      settle(found_, *one);
-      known = *std::move(one);
-      estimate(*found_.context.source, found_.context.scales, found_.effects);
       return true;
     }
     settle(found_, effect);

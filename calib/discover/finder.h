@@ -30,6 +30,9 @@ struct FinderOptions {
   double most_scale = std::numeric_limits<double>::infinity();
 };
 
+/// The correlation from which two columns, or curves, can hardly be told apart: a convention.
+inline constexpr double kGoTogether = 0.9;
+
 /// Something else that explains as much.
 struct Alternative {
   std::string name{};

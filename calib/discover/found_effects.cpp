@@ -35,6 +35,13 @@ std::shared_ptr<const RowSource> sourceOf(const Context& context,
   return some.size() == context.included.size() ? context.source : sourceWith(context, some);
 }
 
+Context knowingOnly(const Found& found, const std::vector<Effect>& effects) {
+  Context context = found.context;
+  context.known = groupsOf(effects);
+  for (TermGroup& tangent : tangentsOf(effects)) context.known.push_back(std::move(tangent));
+  return context;
+}
+
 void settle(Found& found, Effect& effect) {
   for (FittedForm& part : effect.parts) {
     for (Term& term : part.group.terms) {

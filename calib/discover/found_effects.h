@@ -23,6 +23,9 @@ std::vector<std::shared_ptr<const NamedFit>> fitsOf(const std::vector<Effect>& e
 std::shared_ptr<const RowSource> sourceOf(const Context& context,
                                           const std::vector<std::shared_ptr<const NamedFit>>& some);
 
+/// A search that knows these effects, and the fitted ones of all that were found, which its source includes.
+Context knowingOnly(const Found& found, const std::vector<Effect>& effects);
+
 /// An effect's terms as they are written once they are known. What was estimated from all captures has had
 /// its share of their noise, so that it competes no more.
 void settle(Found& found, Effect& effect);

@@ -18,13 +18,6 @@ std::vector<Effect> othersThan(const Found& found, const Effect& effect) {
   return others;
 }
 
-Context knowingOnly(const Found& found, const std::vector<Effect>& effects) {
-  Context context = found.context;
-  context.known = groupsOf(effects);
-  for (TermGroup& tangent : tangentsOf(effects)) context.known.push_back(std::move(tangent));
-  return context;
-}
-
 Effect partOf(FittedForm form) {
   Effect part;
   part.name = form.group.name, part.covariates = covariatesOf(form.group), part.stage = form.group.terms.front().stage;
@@ -67,35 +60,6 @@ Gain gainOfSum(const Context& without, const Effect& effect, const Effect& more)
   return gainOfParts(without, parts);
 }
 
-/// A curve of one covariate, or several times that; not what light does along it, nor what is known by name.
-bool goesAlongOne(const Context& context, const Effect& effect) {
-  return !effect.is_catalogue && effect.parts.size() == 1 && effect.covariates.size() == 1 &&
-         infoOf(context, effect.covariates.front()) != nullptr;
-}
-
-/// Whether both, fitted together, are large beside their sum: their mean squares are four times its.
-bool nearlyCancel(const Context& without, const Effect& a, const Effect& b) {
-  constexpr double kLarge = 4.0;
-  const TermGroup both[]{a.parts.front().group, b.parts.front().group};
-  const Part prepared = prepare(without, both, false);
-  const Group &of_a = prepared.marginal.groups[prepared.first], &of_b = prepared.marginal.groups[prepared.first + 1];
-  Columns pair;
-  append(pair, of_a), append(pair, of_b);
-  Columns all = prepared.model;
-  all.insert(all.end(), pair.begin(), pair.end());
-  const Fit model = fit(prepared.marginal, prepared.model);
-  const Eigen::VectorXd sum =
-      fit(prepared.marginal, all).coefficient.tail(static_cast<Eigen::Index>(pair.size()));
-  const Eigen::MatrixXd left =
-      prepared.marginal.gram(pair, pair) -
-      prepared.marginal.gram(pair, prepared.model) * model.inverse * prepared.marginal.gram(prepared.model, pair);
-  Eigen::VectorXd only_a = sum, only_b = sum;
-  only_a.tail(static_cast<Eigen::Index>(of_b.count)).setZero();
-  only_b.head(static_cast<Eigen::Index>(of_a.count)).setZero();
-  const auto sizeOf = [&](const Eigen::VectorXd& x) { return x.dot(left * x); };
-  return sizeOf(only_a) + sizeOf(only_b) > kLarge * sizeOf(sum);
-}
-
 /// What stays at each pixel was learned from all captures, those that are held out, too: it says nothing of others.
 bool mayGo(const Context& without, const FittedForm& part) {
   return std::ranges::all_of(part.group.terms,
@@ -119,12 +83,6 @@ std::optional<std::size_t> needlessPart(const Context& without, const std::vecto
   return needless;
 }
 
-void tellSum(const Context& without, Effect& effect) {
-  const Gain gain = gainOfParts(without, effect.parts);
-  effect.gain = against0(gain), effect.gain.mean = gain.total, effect.predicts = holds(gain);
-  effect.tried.clear(), effect.alternatives.clear(), effect.experiment.reset();
-}
-
 /// What was said of it was said of parts that are gone.
 void tellAgain(Found& found, const Context& without, Effect& effect) {
   if (effect.parts.size() == 1) {
@@ -137,7 +95,9 @@ void tellAgain(Found& found, const Context& without, Effect& effect) {
       return;
     }
   }
-  tellSum(without, effect);
+  const Gain gain = gainOfParts(without, effect.parts);
+  effect.gain = against0(gain), effect.gain.mean = gain.total, effect.predicts = holds(gain);
+  effect.tried.clear(), effect.alternatives.clear(), effect.experiment.reset();
 }
 
 }  // namespace
@@ -159,25 +119,6 @@ void reshape(Found& found, Effect& effect, const Effect& more) {
     }
   }
   addPart(effect, more);
-}
-
-std::optional<Effect> asOne(const Found& found, const Effect& known, const Effect& more) {
-  if (!goesAlongOne(found.context, known) || !goesAlongOne(found.context, more)) return std::nullopt;
-  const Context without = knowingOnly(found, othersThan(found, known));
-  if (!nearlyCancel(without, known, more)) return std::nullopt;
-  auto explanations = competeFor(without, known.covariates);
-  for (Explanation& one : competeFor(without, more.covariates)) explanations.push_back(std::move(one));
-  const Gain both = gainOfSum(without, known, more);
-  const auto chosen = choose(explanations);
-  Effect one = known;
-  if (chosen && !isMoreThanParts(both, explanations[*chosen].gain)) {
-    one = effectOf(without, explanations, *chosen);
-  } else {
-    addPart(one, more);
-    tellSum(without, one);
-  }
-  one.p = known.p;
-  return one;
 }
 
 void dropNeedlessParts(Found& found) {

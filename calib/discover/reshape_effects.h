@@ -9,11 +9,6 @@ namespace toftwin::discover {
 /// shape, if one does as well as both together; else their sum.
 void reshape(Found& found, Effect& effect, const Effect& more);
 
-/// Where two covariates are nearly one, as the range and the angle along a wall, curves along both may nearly cancel, and
-/// which of them the error goes with cannot be told. They are one effect: along either, if that says as much of other
-/// captures, or along both. Nothing where they do not cancel.
-std::optional<Effect> asOne(const Found& found, const Effect& known, const Effect& more);
-
 /// What was found first of an effect may be nothing beside the rest of it: raw exposures that are unequal beside waves
 /// of the range and of the gain. Numbers that answer for each other would be fitted far off.
 void dropNeedlessParts(Found& found);

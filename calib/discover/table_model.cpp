@@ -105,8 +105,8 @@ std::string effectToml(const TableDiscovery& discovery, const Effect& effect) {
   for (std::size_t i = 0; i < effect.numbers.size(); ++i) {
     const Estimate& number = effect.numbers[i];
     double low = number.value - 1.96 * number.error, high = number.value + 1.96 * number.error;
-    if (const auto around = rowsAround(discovery.open, effect, i))
-      low = std::min(low, around->first), high = std::max(high, around->second);
+    if (const auto step = stepRows(discovery.open, effect, i))
+      low = std::min(low, step->below), high = std::max(high, step->from);
     out += fmt::format(
         "  [[effect.number]]\n  name = {}\n  value = {}\n  standard_error = {}\n  interval_95 = {}\n",
         settings::toToml(number.name), settings::toToml(number.value), settings::toToml(number.error),

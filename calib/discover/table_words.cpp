@@ -23,10 +23,10 @@ std::string sizeOf(const TableDiscovery& d, const Effect& effect) {
 /// " between 500 and 1000": of a step, the rows on both sides.
 std::string betweenInWords(const TableDiscovery& d, const Effect& effect) {
   for (std::size_t i = 0; i < effect.numbers.size() && effect.parts.size() == 1; ++i) {
-    const auto around = rowsAround(d.open, effect, i);
-    if (!around) continue;
-    const auto place = [&](double x) { return placeInWords(d, effect.covariates[0], x); };
-    return fmt::format(" between {} and {}", place(around->first), place(around->second));
+    const auto step = stepRows(d.open, effect, i);
+    if (!step) continue;
+    const auto place = [&](double x) { return placeInWords(d, step->covariate, x); };
+    return fmt::format(" between {} and {}", place(step->below), place(step->from));
   }
   return {};
 }

@@ -2,10 +2,6 @@
 // Which parts an effect has.
 #include "calib/discover/reshape_effects.h"
 
-#include <optional>
-#include <string>
-#include <vector>
-
 #include <gtest/gtest.h>
 
 #include "tests/discover/two_covariates.h"
@@ -58,43 +54,6 @@ TEST(DropNeedlessParts, CovariatesAreThoseOfWhatIsLeft) {
   const Effect one = leftOf([](double a, double, double) { return 10.0 * a * a; }, 1);
   EXPECT_EQ(one.parts.size(), 1U);
   EXPECT_EQ(one.covariates, (std::vector<std::string>{"a"}));
-}
-
-Effect effectAlong(const char* covariate, double power) {
-  Effect effect;
-  effect.name = covariate, effect.covariates = {covariate}, effect.stage = Stage::Range;
-  effect.parts = {formOf(covariate, {powerOf(covariate, power)})};
-  return effect;
-}
-
-/// What a curve along a and another along b become; b goes with a but for a twentieth.
-std::optional<Effect> oneOf(const TwoCovariates::Hidden& hidden, const Effect& a, const Effect& b) {
-  Found found;
-  found.context = contextOf(hidden, 1, 0.0, 0.95);
-  found.effects.push_back(a);
-  return asOne(found, found.effects.front(), b);
-}
-
-TEST(AsOne, WhatACurveAlongOneSaysAsWellGoesAlongOne) {
-  const auto one = oneOf([](double a, double, double) { return 40.0 * (a * a - a); }, effectAlong("a", 2.0),
-                         effectAlong("b", 1.0));
-  ASSERT_TRUE(one);
-  EXPECT_EQ(one->parts.size(), 1U);
-  EXPECT_EQ(one->covariates, (std::vector<std::string>{"a"}));
-}
-
-TEST(AsOne, WhatTheDifferenceSaysGoesAlongBoth) {
-  const auto one = oneOf([](double a, double b, double) { return 400.0 * (a - b); }, effectAlong("a", 1.0),
-                         effectAlong("b", 1.0));
-  ASSERT_TRUE(one);
-  EXPECT_EQ(one->parts.size(), 2U);
-  EXPECT_EQ(one->covariates, (std::vector<std::string>{"a", "b"}));
-  EXPECT_TRUE(one->predicts);
-}
-
-TEST(AsOne, WhatDoesNotCancelStaysTwo) {
-  EXPECT_FALSE(oneOf([](double a, double b, double) { return 40.0 * (a + b); }, effectAlong("a", 1.0),
-                     effectAlong("b", 1.0)));
 }
 
 }  // namespace

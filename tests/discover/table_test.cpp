@@ -156,10 +156,11 @@ TEST(DiscoverTable, SaysHowLargeAnEffectIsAndBetweenWhichSettingsItSteps) {
   ASSERT_TRUE(discovery) << discovery.error().message;
   ASSERT_EQ(discovery->finding.effects.size(), 1u) << verdictOf(*discovery);
   ASSERT_EQ(discovery->finding.effects[0].name, "step in exposure_us");
-  const auto around = rowsAround(discovery->open, discovery->finding.effects[0], 1);
-  ASSERT_TRUE(around);
-  EXPECT_EQ(*around, (std::pair{500.0, 1000.0}));
-  EXPECT_FALSE(rowsAround(discovery->open, discovery->finding.effects[0], 0)) << "its height is no place";
+  const auto step = stepRows(discovery->open, discovery->finding.effects[0], 1);
+  ASSERT_TRUE(step);
+  EXPECT_EQ(step->covariate, "exposure_us");
+  EXPECT_EQ(std::pair(step->below, step->from), (std::pair{500.0, 1000.0}));
+  EXPECT_FALSE(stepRows(discovery->open, discovery->finding.effects[0], 0)) << "its height is no place";
   const auto sizes = effectIn(discovery->open, discovery->finding.effects[0]);
   EXPECT_NEAR(std::ranges::max(sizes) - std::ranges::min(sizes), 6.0, 4.0 * 2.0 / std::sqrt(400.0));
   EXPECT_THAT(verdictOf(*discovery), testing::ContainsRegex("by up to [56]\\.[0-9]+ mm"));
