@@ -51,14 +51,42 @@ ResistantLine resistantLine(const std::vector<double>& x, const std::vector<doub
   return line;
 }
 
-bool goesOneToOne(const NamedColumns& columns, const std::string& name, const std::string& measured) {
-  constexpr double kMostGain = 0.05;
-  if (columns.isText(name) || columns.isTime(name) || columns.isText(measured)) return false;
+constexpr double kMostGain = 0.05;
+
+/// Whether one is the other in another unit of length: the ratio of two that people use.
+bool isRatioOfUnits(double ratio) {
+  constexpr double kPerMetre[]{1.0, 100.0, 1000.0, 1e6, 1.0 / 0.0254, 1.0 / 0.3048};
+  for (const double a : kPerMetre)
+    for (const double b : kPerMetre)
+      if (a != b && std::abs(ratio * a / b - 1.0) < kMostGain) return true;
+  return false;
+}
+
+enum class Goes { Otherwise, OneToOne, InOtherUnits };
+struct WithMeasured {
+  Goes goes = Goes::Otherwise;
+  double slope = 0.0;  ///< of the measured value, in the columns' units
+};
+WithMeasured goesWith(const NamedColumns& columns, const std::string& name, const std::string& measured) {
+  if (columns.isText(name) || columns.isTime(name) || columns.isText(measured)) return {};
   const auto target = columns.numbers(name), value = columns.numbers(measured);
-  if (!target || !value) return false;
+  if (!target || !value) return {};
   const ResistantLine line = resistantLine(*target, *value);
-  const double gain = line.slope / lengthFactor(unitOf(name), unitOf(measured)) - 1.0;
-  return line.beside < kMostBeside && std::abs(gain) < kMostGain;
+  if (line.beside >= kMostBeside) return {};
+  const double ratio = line.slope / lengthFactor(unitOf(name), unitOf(measured));
+  if (std::abs(ratio - 1.0) < kMostGain) return {Goes::OneToOne, line.slope};
+  const bool are_lengths = isLengthOrNone(unitOf(name)) && isLengthOrNone(unitOf(measured));
+  return {are_lengths && isRatioOfUnits(ratio) ? Goes::InOtherUnits : Goes::Otherwise, line.slope};
+}
+
+Error inOtherUnits(const std::filesystem::path& file, const Roles& roles, const std::string& reference, double slope) {
+  const bool are_said = unitsPerMetre(unitOf(roles.measured)) && unitsPerMetre(unitOf(reference));
+  return {Error::Code::InvalidArgument,
+          fmt::format("{}: {} changes by {:.4g} for each 1 of {}: {}, as in reference_m beside measured_mm. If it is no "
+                      "matter of units, write their difference into a column and say it in a map: error = \"…\"",
+                      file.string(), roles.measured, slope, reference,
+                      are_said ? "one of the headers ends in the wrong unit; end both in their own"
+                               : "they are in other units; end both headers in their own")};
 }
 
 }  // namespace
@@ -66,9 +94,14 @@ bool goesOneToOne(const NamedColumns& columns, const std::string& name, const st
 Result<> guessReference(const NamedColumns& columns, const std::filesystem::path& file, Roles& roles, TableData& data) {
   if (!roles.reference.empty() || !roles.error.empty()) return {};
   std::vector<std::string> found;
-  for (const auto& [name, nature] : roles.covariates)
-    if (namesTarget(name) && isLengthOrNone(unitOf(name)) && goesOneToOne(columns, name, roles.measured))
-      found.push_back(name);
+  for (const auto& [name, nature] : roles.covariates) {
+    if (!namesTarget(name) || !isLengthOrNone(unitOf(name))) continue;
+    // Text in a column of lengths is a mistake, such as thousands with commas, and its reference would be missing.
+    if (unitsPerMetre(unitOf(name)) && columns.isText(name)) return columns.numbers(name).error();
+    const auto [goes, slope] = goesWith(columns, name, roles.measured);
+    if (goes == Goes::InOtherUnits) return inOtherUnits(file, roles, name, slope);
+    if (goes == Goes::OneToOne) found.push_back(name);
+  }
   if (found.empty()) return {};
   if (found.size() > 1) {
     return Error{Error::Code::InvalidArgument,
@@ -92,14 +125,7 @@ Result<> checkUnits(const Roles& roles, const TableData& data, double scale) {
   const ResistantLine line = resistantLine(data.reference, measured);
   const double gain = line.slope / scale;
   if (line.beside >= kMostBeside || (gain > 0.5 && gain < 2.0)) return {};
-  const bool are_said = unitsPerMetre(unitOf(roles.measured)) && unitsPerMetre(unitOf(roles.reference));
-  return Error{
-      Error::Code::InvalidArgument,
-      fmt::format("{}: {} changes by {:.4g} for each 1 of {}: {}, as in reference_m beside measured_mm. If it is no "
-                  "matter of units, write their difference into a column and say it in a map: error = \"…\"",
-                  data.file.string(), roles.measured, line.slope, roles.reference,
-                  are_said ? "one of the headers ends in the wrong unit; end both in their own"
-                           : "they are in other units; end both headers in their own")};
+  return inOtherUnits(data.file, roles, roles.reference, line.slope);
 }
 
 }  // namespace toftwin::discover

@@ -68,5 +68,20 @@ TEST(ReferenceColumn, InAnotherUnitThanItsHeaderSaysIsAnError) {
   EXPECT_TRUE(readTargets(targets("reference_m", 1.0, 300.0))) << "a gain";
 }
 
+/// Of a column that only its word makes the reference, too.
+TEST(ReferenceColumn, AGuessedOneInOtherUnitsIsAnError) {
+  EXPECT_THAT(readTargets(targets("laser_mm", 1.0)).error().message,
+              HasSubstr("for each 1 of laser_mm: one of the headers ends in the wrong unit"));
+  for (const auto& [header, units] : {std::pair{"laser", 1.0}, {"laser_in", 1.0 / 0.0254}, {"target_cm", 1.0 / 0.3048}})
+    EXPECT_THAT(readTargets(targets(header, units)).error().message, HasSubstr("changes by")) << header;
+  EXPECT_TRUE(readTargets(targets("target_number", 20.0))) << "50 mm for each";
+}
+
+TEST(ReferenceColumn, LengthsThatAreTextAreAnError) {
+  std::string text = "laser_mm,measured_mm,t_s\n";
+  for (int i = 0; i < 60; ++i) text += fmt::format("\"{},{:03}.0\",{},{}\n", 1 + i % 3, i * 16, 1003.0 + i, i);
+  EXPECT_THAT(readTargets(text).error().message, HasSubstr("\"1,000.0\" in column \"laser_mm\" is not a number"));
+}
+
 }  // namespace
 }  // namespace toftwin::discover
