@@ -2,7 +2,6 @@
 #include "calib/compare/characteristics.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
 #include <set>
@@ -37,15 +36,10 @@ void addRegion(std::vector<Region>& regions, const Pixels& pixels, std::string n
 }
 
 void addRangeRegions(std::vector<Region>& regions, const Pixels& pixels) {
-  constexpr std::array kEdges_m{0.0, 0.75, 1.0, 1.5, 2.0, 3.0, 4.5, 100.0};
-  for (std::size_t bin = 0; bin + 1 < kEdges_m.size(); ++bin) {
-    const double from = kEdges_m[bin], to = kEdges_m[bin + 1];
-    addRegion(
-        regions, pixels,
-        to > 50.0 ? fmt::format("range over {} m", from) : fmt::format("range {}–{} m", from, to),
-        [&](std::size_t i) {
-          return pixels.range_mm[i] >= 1e3 * from && pixels.range_mm[i] < 1e3 * to;
-        });
+  for (std::size_t bin = 0; bin + 1 < kRangeEdges_m.size(); ++bin) {
+    addRegion(regions, pixels, rangeRegionName(bin), [&](std::size_t i) {
+      return pixels.range_mm[i] >= 1e3 * kRangeEdges_m[bin] && pixels.range_mm[i] < 1e3 * kRangeEdges_m[bin + 1];
+    });
   }
 }
 
@@ -63,6 +57,11 @@ void addAmplitudeRegions(std::vector<Region>& regions, const Pixels& pixels) {
 }
 
 }  // namespace
+
+std::string rangeRegionName(std::size_t bin) {
+  const double from = kRangeEdges_m[bin], to = kRangeEdges_m[bin + 1];
+  return to > 50.0 ? fmt::format("range over {} m", from) : fmt::format("range {}–{} m", from, to);
+}
 
 std::vector<std::uint32_t> placesOf(const std::vector<PoseComparison>& poses) {
   std::vector<std::uint32_t> place(poses.size());

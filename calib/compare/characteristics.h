@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -16,6 +17,10 @@ namespace toftwin::compare {
 /// For each pose the number of its place: equal for equal poses, so that a pose visited again is no
 /// second place. A pose that is not known is a place of its own.
 std::vector<std::uint32_t> placesOf(const std::vector<PoseComparison>& poses);
+
+/// What is near and far, in reports: between these ranges.
+inline constexpr std::array kRangeEdges_m{0.0, 0.75, 1.0, 1.5, 2.0, 3.0, 4.5, 100.0};
+std::string rangeRegionName(std::size_t bin);
 
 /// One row of the result: some pixels of all poses together.
 struct Region {

@@ -109,18 +109,22 @@ double curveAt(const TermGroup& group, const std::vector<double>& coefficient,
   return sum;
 }
 
-/// One covariate is held in the middle of its spread, the other goes from end to end: where do they differ
-/// most?
+/// One covariate goes from end to end, the others are held in the middle of their spread: where do they differ most?
+/// What is told to be held is what only one of both explanations has, if there is such. Carriers are none.
 std::optional<Experiment> experimentOf(const Context& context, const Effect& effect,
                                        const Alternative& other) {
   std::set<std::string> names(effect.covariates.begin(), effect.covariates.end());
   names.insert(other.covariates.begin(), other.covariates.end());
+  std::erase_if(names, [&](const std::string& name) { return infoOf(context, name) == nullptr; });
   std::map<std::string, double> middle;
   for (const std::string& name : names) {
     const CovariateInfo* info = infoOf(context, name);
-    if (info == nullptr || info->quantiles.empty()) return std::nullopt;
+    if (info->quantiles.empty()) return std::nullopt;
     middle[name] = info->quantiles[info->quantiles.size() / 2];
   }
+  const auto isOfOne = [&](const std::string& name) {
+    return std::ranges::count(effect.covariates, name) != std::ranges::count(other.covariates, name);
+  };
   std::optional<Experiment> best;
   const TermGroup& mine = effect.parts.front().group;
   for (const std::string& vary : names) {
@@ -136,7 +140,7 @@ std::optional<Experiment> experimentOf(const Context& context, const Effect& eff
         std::string hold;
         double held_at = 0.0;
         for (const std::string& name : names)
-          if (name != vary) hold = name, held_at = middle[name];
+          if (name != vary && (hold.empty() || isOfOne(name))) hold = name, held_at = middle[name];
         best = Experiment{vary, hold, q[k], q[i], held_at, difference};
       }
     }

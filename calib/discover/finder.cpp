@@ -54,7 +54,9 @@ class Search {
       joinCancelling(found_);
       if (found_.context.original->named() != nullptr) markRests(found_);
     }
-    finding_.nuisances = estimate(*found_.context.source, found_.context.scales, found_.effects);
+    const auto estimated = [&] { return estimate(*found_.context.source, found_.context.scales, found_.effects); };
+    finding_.nuisances = estimated();
+    if (retellUndetermined(found_)) finding_.nuisances = estimated();
     finding_.scales = found_.context.scales;
     updateKnown();
     finding_.dispersion = dispersionNow();

@@ -163,6 +163,26 @@ void revise(Found& found) {
   }
 }
 
+bool retellUndetermined(Found& found) {
+  bool is_any = false;
+  for (Effect& effect : found.effects) {
+    if (effect.is_catalogue || effect.parts.size() != 1 || effect.numbers.empty()) continue;
+    const bool has_one = effect.parts[0].group.terms.size() == 1 && !effect.parts[0].form.inner.empty();
+    if (!has_one || std::abs(effect.numbers[0].value) >= 2.0 * effect.numbers[0].error) continue;
+    const Context without = knowingOnly(found, othersThan(found, effect));
+    auto explanations = competeFor(without, effect.covariates);
+    std::erase_if(explanations, [](const Explanation& one) { return !one.fitted.form.inner.empty(); });
+    const auto chosen = choose(explanations);
+    if (!chosen) continue;
+    Effect again = effectOf(without, explanations, *chosen);
+    settle(found, again);
+    again.p = effect.p;
+    effect = std::move(again);
+    is_any = true;
+  }
+  return is_any;
+}
+
 void prune(Found& found) {
   while (found.effects.size() > 1) {
     std::size_t least = found.effects.size();

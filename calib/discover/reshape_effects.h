@@ -16,6 +16,11 @@ void dropNeedlessParts(Found& found);
 /// Each effect's shape once more, now that the others no longer stand in its way.
 void revise(Found& found);
 
+/// A formula whose one coefficient is less than two standard errors from nothing, though it predicts, is a piece of a curve
+/// so wide that its inner numbers stand for one another: a simpler shape or a free curve says the same with numbers that
+/// mean something. Effects must be estimated; whether any is told otherwise now.
+bool retellUndetermined(Found& found);
+
 /// An effect that the others explain as well was a step on the way to them: it goes, the least useful
 /// first.
 void prune(Found& found);

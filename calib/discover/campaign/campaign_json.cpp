@@ -33,12 +33,24 @@ Json toJson(const std::vector<StoodOff>& off) {
   return all;
 }
 
+Json toJson(const JudgedRegion& region) {
+  Json json = Json::object();
+  json.set("name", region.name).set("pixels", region.pixels);
+  json.set("bias_before_mm", region.bias_before_mm).set("bias_after_mm", region.bias_after_mm);
+  json.set("rms_before_mm", region.rms_before_mm).set("rms_after_mm", region.rms_after_mm);
+  json.set("p95_before_mm", region.p95_before_mm).set("p95_after_mm", region.p95_after_mm);
+  return json.set("noise_mm", region.noise_mm);
+}
+
 Json toJson(const Judgement& judged) {
   Json locked = Json::object();
   locked.set("before", toJson(judged.before)).set("after", toJson(judged.after));
   locked.set("with_zero", toJson(judged.with_zero)).set("removed_by_zero", judged.removed_by_zero);
   locked.set("removed", judged.removed).set("removed_low", judged.removed_low);
   locked.set("removed_high", judged.removed_high).set("explainable_chi2", judged.explainable);
+  Json regions = Json::array();
+  for (const JudgedRegion& region : judged.regions) regions.push(toJson(region));
+  locked.set("regions", std::move(regions));
   locked.set("cells", judged.cells).set("noise_chi2_per_row", judged.noise).set("gained_chi2", judged.gained);
   return locked;
 }

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <functional>
 
@@ -12,6 +11,7 @@
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/discover_campaign.h"
 #include "calib/discover/campaign/gather_capture.h"
+#include "calib/discover/campaign/locked_section.h"
 #include "calib/discover/campaign/pose_errors.h"
 
 namespace toftwin::discover {
@@ -110,68 +110,6 @@ compare::TableBlock effectTable(const CampaignFinding& finding) {
                           fmt::format("{}", fmt::join(words, "; ")), "–", "–"});
   }
   return table;
-}
-
-std::string capitalised(std::string sentence) {
-  sentence.front() = static_cast<char>(std::toupper(static_cast<unsigned char>(sentence.front())));
-  return sentence;
-}
-
-bool hasDelay(const CampaignFinding& finding) { return finding.zero.delay_mm != 0.0; }
-
-/// What model.toml has that is no effect, and what of the locked captures' error it is; empty: nothing.
-std::string delayInWords(const CampaignFinding& finding) {
-  if (!hasDelay(finding)) return "";
-  std::string words =
-      fmt::format("a delay of the light of {:.2f} mm, which the camera file lacks", finding.zero.delay_mm);
-  const auto& judged = finding.judgement;
-  if (judged && judged->removed_by_zero < 0.0)
-    words += fmt::format(", by itself makes the locked captures fit worse, by {} of what can be explained",
-                         compare::shownPercent(-judged->removed_by_zero));
-  else if (judged)
-    words += fmt::format(", removes {} of what can be explained", compare::shownPercent(judged->removed_by_zero));
-  else
-    words += ", is in model.toml";
-  return words;
-}
-
-compare::TableBlock lockedTable(const CampaignFinding& finding) {
-  const Judgement& judgement = *finding.judgement;
-  compare::TableBlock table{"Measured − simulated on the locked captures, edges left out",
-                            {"model", "bias [mm]", "RMS [mm]", "95 % within [mm]", "χ² per row",
-                             "neighbours alike", "masks agree"},
-                            {}};
-  const auto row = [&](const char* name, const RangeErrors& errors) {
-    table.rows.push_back({name, shown(errors.bias_mm, 2), shown(errors.rms_mm, 2),
-                          shown(errors.p95_mm, 2), shown(errors.per_row, 2),
-                          shown(errors.neighbour_correlation, 2),
-                          compare::shownPercent(errors.masks_agree)});
-  };
-  row("as declared", judgement.before);
-  if (hasDelay(finding)) row("as declared, with the light's delay", judgement.with_zero);
-  row("with what was found", judgement.after);
-  return table;
-}
-
-compare::Figure figureOver(const Judgement& judgement, const char* label,
-                           const std::function<double(const JudgedCapture&)>& x) {
-  compare::Curve before{
-      .name = "as declared", .ink = compare::Ink::Baseline, .stroke = compare::Stroke::Dots};
-  compare::Curve after{.name = "with what was found",
-                       .ink = compare::Ink::Simulated,
-                       .stroke = compare::Stroke::Dots};
-  for (const JudgedCapture& one : judgement.captures) {
-    if (!std::isfinite(x(one))) continue;
-    before.x.push_back(x(one)), before.y.push_back(one.before_mm);
-    after.x.push_back(x(one)), after.y.push_back(one.after_mm);
-  }
-  return {fmt::format("Mean error of each locked capture over {}.", label),
-          toSvg(compare::Plot{.title = fmt::format("error over {}", label),
-                              .x_label = label,
-                              .y_label = "measured − simulated [mm]",
-                              .curves = {before, after},
-                              .zero_line = true,
-                              .compact = true})};
 }
 
 compare::TableBlock seenTable(const CampaignFinding& finding) {
@@ -389,21 +327,7 @@ Result<std::filesystem::path> writeReport(const CampaignJob& job, const Campaign
   report.verdict = verdictOf(finding) + ".";
   report.cards = cardsOf(finding);
   report.sections.push_back(foundSection(finding));
-  if (finding.judgement) {
-    compare::Section section{.id = "locked", .title = "Before and after, on locked captures"};
-    section.verdict = fmt::format("{}χ² above the noise falls by {} (95 %: {} to {}).",
-                                  hasDelay(finding) ? capitalised(delayInWords(finding)) + ". By what was found, " : "",
-                                  compare::shownPercent(finding.judgement->removed),
-                                  compare::shownPercent(finding.judgement->removed_low),
-                                  compare::shownPercent(finding.judgement->removed_high));
-    section.blocks.emplace_back(lockedTable(finding));
-    section.blocks.emplace_back(
-        compare::FigureRow{{figureOver(*finding.judgement, "time since power-on [s]",
-                                       [](const JudgedCapture& c) { return c.since_power_on_s; }),
-                            figureOver(*finding.judgement, "distance [m]",
-                                       [](const JudgedCapture& c) { return c.distance_m; })}});
-    report.sections.push_back(std::move(section));
-  }
+  if (finding.judgement) report.sections.push_back(lockedSection(finding));
   report.colophon = fmt::format("toftwin {}, {}{}{}; {:.0f} s", TOFTWIN_VERSION, today(),
                                 job.note.empty() ? "" : ", ", job.note, finding.seconds);
   report.data = jsonOf(job, finding);

@@ -3,7 +3,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
+
+#include <toftwin/nan.h>
 
 #include "calib/compare/statistics.h"
 #include "calib/discover/campaign/explained.h"
@@ -14,7 +15,8 @@ namespace {
 
 /// Errors of one capture's pixels.
 struct Errors {
-  std::vector<double> all_mm{};
+  Image<float> each_mm{};          ///< NaN: none, or a gross one
+  std::vector<double> all_mm{};    ///< where depth does not jump
   double agree = 0.0, looked_at = 0.0;
   double neighbours = 0.0, squares = 0.0;
 };
@@ -22,7 +24,8 @@ Errors errorsOf(const MeasuredCapture& capture, const TracedCapture& traced, con
                 double offset_mm) {
   Errors errors;
   const int width = simulated.range_m.width(), height = simulated.range_m.height();
-  Image<float> left(width, height, std::numeric_limits<float>::quiet_NaN());
+  Image<float> left(width, height, kNaN);
+  errors.each_mm = left;
   double mean = 0.0;
   for (std::size_t i = 0; i < left.size(); ++i) {
     const bool measured = capture.valid_share[i] >= 0.5F,
@@ -31,7 +34,9 @@ Errors errorsOf(const MeasuredCapture& capture, const TracedCapture& traced, con
     float error = capture.range_m.mean[i] - simulated.range_m[i];
     for (std::size_t way = 0; way < traced.stood.size(); ++way)
       error += static_cast<float>(traced.stood[way]) * traced.range_m[way][i];
-    if (!std::isfinite(error) || std::abs(error) > kGross_m || traced.is_edge[i] != 0) continue;
+    if (!std::isfinite(error) || std::abs(error) > kGross_m) continue;
+    errors.each_mm[i] = 1e3F * error - static_cast<float>(offset_mm);
+    if (traced.is_edge[i] != 0) continue;
     left[i] = error;
     errors.all_mm.push_back(1e3 * static_cast<double>(error) - offset_mm);
     mean += static_cast<double>(error);
@@ -46,6 +51,46 @@ Errors errorsOf(const MeasuredCapture& capture, const TracedCapture& traced, con
   }
   return errors;
 }
+
+/// Pixels of a capture that have an error before and after.
+void addPixels(const MeasuredCapture& capture, const TracedCapture& traced, const Reading& simulated, const Errors& then,
+               const Errors& now, std::vector<JudgedPixel>& pixels) {
+  const int width = then.each_mm.width(), height = then.each_mm.height();
+  const float middle_x = 0.5F * static_cast<float>(width - 1), middle_y = 0.5F * static_cast<float>(height - 1);
+  const float half_diagonal = std::hypot(middle_x, middle_y);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const float before = then.each_mm(x, y), after = now.each_mm(x, y);
+      if (!std::isfinite(before + after)) continue;
+      const float radius = std::hypot(static_cast<float>(x) - middle_x, static_cast<float>(y) - middle_y);
+      const Image<float>& log_amplitude = capture.log_amplitude.mean;
+      pixels.push_back({.before_mm = before,
+                        .after_mm = after,
+                        .range_m = simulated.range_m(x, y),
+                        .log_amplitude = log_amplitude.empty() ? kNaN : log_amplitude(x, y),
+                        .variance_mm2 = 1e6F * capture.range_m.variance(x, y),
+                        .radius = half_diagonal > 0.0F ? radius / half_diagonal : 0.0F,
+                        .is_edge = traced.is_edge(x, y) != 0});
+    }
+  }
+}
+
+/// The mean over captures of each pixel.
+class Mean {
+ public:
+  void add(const Image<float>& each) {
+    if (sum_.empty()) sum_ = Image<float>(each.width(), each.height()), count_ = sum_;
+    for (std::size_t i = 0; i < each.size(); ++i)
+      if (std::isfinite(each[i])) sum_[i] += each[i], count_[i] += 1.0F;
+  }
+  [[nodiscard]] Image<float> take() {
+    for (std::size_t i = 0; i < sum_.size(); ++i) sum_[i] /= count_[i];  // 0/0: none
+    return std::move(sum_);
+  }
+
+ private:
+  Image<float> sum_{}, count_{};
+};
 
 struct Totals {
   std::vector<double> all_mm{};
@@ -80,17 +125,23 @@ Result<Judgement> judge(const JudgedCampaign& judged, const JudgedCampaign& open
   if (!camera_after) return camera_after.error();
   Judgement judgement;
   Totals all_before, all_with_zero, all_after;
+  std::vector<JudgedPixel> pixels;
+  Mean mean_before, mean_after;
   for (std::size_t c = 0; c < judged.lit.captures.size(); ++c) {
     const MeasuredCapture& capture = judged.lit.captures[c];
     const TracedCapture& traced = *judged.lit.traced[c];
     const sim::Light& varied = *judged.lit.varied[c];
-    const auto errors = [&](const NoiselessCamera& camera, double offset_mm) {
-      return errorsOf(capture, traced,
-                      readingOf(*camera_before, camera, capture, traced.light, varied), offset_mm);
+    const auto readingBy = [&](const NoiselessCamera& camera) {
+      return readingOf(*camera_before, camera, capture, traced.light, varied);
     };
-    const Errors then = errors(*camera_before, before.offset_mm),
-                 now = errors(*camera_after, after.offset_mm);
+    const auto errors = [&](const NoiselessCamera& camera, double offset_mm) {
+      return errorsOf(capture, traced, readingBy(camera), offset_mm);
+    };
+    const Reading declared = readingBy(*camera_before);
+    const Errors then = errorsOf(capture, traced, declared, before.offset_mm), now = errors(*camera_after, after.offset_mm);
     all_before.add(then), all_after.add(now);
+    addPixels(capture, traced, declared, then, now, pixels);
+    mean_before.add(then.each_mm), mean_after.add(now.each_mm);
     all_with_zero.add(errors(*camera_with_zero, with_zero.offset_mm));
     const compare::Summary s = compare::summarise(then.all_mm), t = compare::summarise(now.all_mm);
     judgement.captures.push_back({capture.record.name, capture.record.block, s.mean, t.mean, s.rms,
@@ -99,6 +150,8 @@ Result<Judgement> judge(const JudgedCampaign& judged, const JudgedCampaign& open
   }
   all_before.into(judgement.before), all_after.into(judgement.after);
   all_with_zero.into(judgement.with_zero);
+  judgement.regions = regionsOf(pixels);
+  judgement.mean = {mean_before.take(), mean_after.take()};
   if (judged.lit.captures.empty()) return judgement;
   if (auto added = addExplained(judged, open, models, judgement); !added) return added.error();
   return judgement;

@@ -5,6 +5,7 @@
 
 #include <toftwin/result.h>
 
+#include "calib/discover/campaign/judged_regions.h"
 #include "calib/discover/campaign/refit.h"
 
 namespace toftwin::discover {
@@ -44,6 +45,8 @@ struct JudgedModels {
 struct Judgement {
   RangeErrors before{}, with_zero{}, after{};
   std::vector<JudgedCapture> captures{};
+  std::vector<JudgedRegion> regions{};
+  MeanErrors mean{};
   /// The share of what can be explained that where zero lies removes: of χ²_before over noise what χ²_zero is
   /// less by.
   double removed_by_zero = 0.0;
