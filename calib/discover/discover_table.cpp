@@ -108,7 +108,7 @@ Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const Ta
   out.plain = fitNuisances(source, out.finding.scales);
   out.before = left(out.open, predicted(source, out.open, out.plain, {}));
   out.after = left(out.open, predicted(source, out.open, out.finding.nuisances, out.finding.effects));
-  if (wanderInWords(out).empty()) out.odd = oddCaptures(source, out.after);
+  if (wanderAlong(out).empty()) out.odd = oddCaptures(source, out.after);
   if (!out.odd.empty()) out.open.doubts.push_back(oddInWords(out));
   // Everything is decided: now the locked rows.
   out.judged = judgeLocked(source, out.locked, out.plain, out.finding);

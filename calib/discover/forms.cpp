@@ -295,15 +295,26 @@ TermGroup built(const Form& form, std::span<const double> inner) {
   return multiplied(std::move(group), form);
 }
 
+namespace {
+
+Form times(Form form, const CovariateInfo& other, double power) {
+  form.times = powerOrLog(other, power).factors[0];
+  form.name = fmt::format("{} · {}", form.name, inWords(*form.times));
+  form.covariates.push_back(other.name);
+  return form;
+}
+
+}  // namespace
+
 std::vector<FittedForm> crossedWith(const FittedForm& one, const CovariateInfo& other) {
   std::vector<FittedForm> all;
   const auto add = [&](double power, bool keeps_own) {
     FittedForm crossed = one;
     Form& form = crossed.form;
-    form.times = powerOrLog(other, power).factors[0], form.keeps_own = keeps_own;
-    form.name = fmt::format("{} · {}", one.group.name, inWords(*form.times));
+    form.name = one.group.name;
+    form = times(std::move(form), other, power);
+    form.keeps_own = keeps_own;
     if (keeps_own) form.name += " + " + one.group.name;
-    form.covariates.push_back(other.name);
     crossed.group = multiplied(one.group, form);
     all.push_back(std::move(crossed));
   };
@@ -382,6 +393,10 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
   }
   for (const auto& [x, y] : {std::pair{a, b}, std::pair{b, a}}) {
     if (!isContinuous(x)) continue;
+    std::vector<Form> angles;
+    addAngles(x, angles);
+    for (const Form& angle : angles)
+      for (const double q : usablePowers(y)) forms.push_back(times(angle, y, q));
     addChangingHarmonics(x, y, usablePowers(y), forms);
     for (const double q : x.nature == Nature::Time ? usablePowers(y) : std::vector{1.0}) {
       forms.push_back(form(fmt::format("exponential in {} · {}", x.name, powerInWords(y, q)), {x, y},

@@ -110,21 +110,38 @@ std::string oddInWords(const TableDiscovery& d) {
   return fmt::format("rows that follow each other are off by about the same, far from the others: around {}", where);
 }
 
-std::string wanderInWords(const TableDiscovery& d) {
+bool wanders(const TableDiscovery& d) {
   constexpr double kMuch = 0.5, kLong = 20.0;
-  if (!d.noise.dependence || !d.noise.dependence->isClear()) return {};
-  const RowDependence& alike = *d.noise.dependence;
-  if (alike.best.correlation.share < kMuch || d.noise.correlationRows() < kLong) return {};
+  return d.noise.dependence && d.noise.dependence->isClear() && d.noise.dependence->best.correlation.share >= kMuch &&
+         d.noise.correlationRows() >= kLong;
+}
+
+std::vector<std::string> wanderAlong(const TableDiscovery& d) {
   std::vector<std::string> along;
+  if (!wanders(d)) return along;
+  const RowClock& clock = d.noise.dependence->clock;
   for (const TableCovariate& one : d.open.covariates)
-    if (one.name != alike.clock.name && one.nature != Nature::Time && followsClock(alike.clock, one.values))
-      along.push_back(one.name);
-  if (along.empty()) return {};
+    if (one.name != clock.name && one.nature != Nature::Time && followsClock(clock, one.values)) along.push_back(one.name);
+  return along;
+}
+
+std::string wanderInWords(const TableDiscovery& d) {
+  if (!wanders(d)) return {};
+  const auto along = wanderAlong(d);
+  const std::string much = compare::shownPercent(d.noise.dependence->best.correlation.share),
+                    p = significant(d.finding.first_p);
+  if (along.empty()) {
+    return fmt::format(
+        "{} of the error's variance goes slowly from row to row: something that changes with time and that no column "
+        "tells, or a wander, which these rows do not tell apart (p = {} for more than a wander). Give columns of what "
+        "changed meanwhile, a temperature's rate say, or take the same again in another order.",
+        much, p);
+  }
   return fmt::format(
       "{} of the error's variance goes slowly from row to row, and the rows stand in the order of {}: a curve over it "
       "that was gone through once, or a wander with time, which these rows do not tell apart (p = {} for more than a "
       "wander). Measure again in another order, or give columns with the session or the time.",
-      compare::shownPercent(alike.best.correlation.share), joined(along, " and "), significant(d.finding.first_p));
+      much, joined(along, " and "), p);
 }
 
 }  // namespace toftwin::discover

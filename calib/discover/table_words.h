@@ -24,8 +24,12 @@ std::string placeInWords(const TableDiscovery& discovery, const std::string& cov
 bool isCertain(const Effect& effect);
 /// "it goes with time_s (exponential in time_s), by up to 3.1 mm, or with …"
 std::string nameInWords(const TableDiscovery& discovery, const Effect& effect);
-/// Where rows wander and stand in the order of a covariate, that a curve over it and a wander are not to be told apart;
-/// empty where they do not, or not for long.
+/// Whether most of what rows err by goes slowly from one to the next.
+bool wanders(const TableDiscovery& discovery);
+/// Covariates in whose order they stand then, other than time.
+std::vector<std::string> wanderAlong(const TableDiscovery& discovery);
+/// That such a wander and a curve over those, or something that no column tells, are not to be told apart; empty where rows
+/// do not wander.
 std::string wanderInWords(const TableDiscovery& discovery);
 /// That a curve over the reference contains the gain; empty where none does.
 std::string containedInWords(const TableDiscovery& discovery);
