@@ -154,6 +154,22 @@ TEST(Zero, ADelayThatIsNoMoreThanChanceWithWhatIsKnownIsTakenBack) {
   EXPECT_NEAR(zero.offset_error_mm, std::sqrt(0.01 - 0.05 * 0.05), 1e-12);
 }
 
+TEST(Zero, ADelayThatTheCapturesDoNotTellIsNone) {
+  const Zero zero = zeroOf(withDelayOfOne(), 20.0, false);
+  EXPECT_EQ(zero.delay_mm, -20.0);
+}
+
+TEST(TellDelay, NeedsThreePlaces) {
+  std::vector<MeasuredCapture> captures(4);
+  for (std::size_t i = 0; i < captures.size(); ++i) {
+    captures[i].moment.world_from_camera.emplace();
+    captures[i].moment.world_from_camera->translation_m.z = i == 3 ? 0.0 : 0.1 * static_cast<double>(i);
+  }
+  EXPECT_TRUE(tellDelay(captures));
+  captures[1] = captures[0];
+  EXPECT_FALSE(tellDelay(captures)) << "0, 0, 0.2 and 0 m";
+}
+
 TEST(Zero, TheOffsetBesideADelayIsAsUncertainAsBoth) {
   const Zero zero = zeroOf(withDelayOfOne(), 20.0);
   EXPECT_EQ(zero.delay_mm, -1.0);

@@ -395,12 +395,13 @@ Result<Refitted> refit(const CampaignRows& rows, std::vector<sim::AnyEffect> eff
   return result;
 }
 
-Zero zeroOf(const Refitted& refitted, double known_mm) {
+Zero zeroOf(const Refitted& refitted, double known_mm, bool tells_delay) {
   constexpr Eigen::Index kOffset = 0, kGain = 1, kDelay = 2;
   Eigen::Matrix3d covariance = refitted.common_covariance;
   Eigen::Vector3d at{refitted.offset_mm, refitted.gain_percent, refitted.delay_mm};
   const double variance = covariance(kDelay, kDelay);
-  if (variance > 0.0 && std::abs(known_mm + at[kDelay]) <= 3.0 * std::sqrt(variance)) {
+  const bool is_chance = std::abs(known_mm + at[kDelay]) <= 3.0 * std::sqrt(variance);
+  if (variance > 0.0 && (is_chance || !tells_delay)) {
     // Offset and gain where the delay is known to be none.
     const Eigen::Vector3d with_delay = covariance.col(kDelay) / variance;
     at += with_delay * (-known_mm - at[kDelay]);

@@ -73,10 +73,15 @@ struct Zero {
 };
 /// `known_mm`: the delay that the fitted effects have already. It is tested with what was fitted beyond it, and taken
 /// back where both together are no more than chance. The zero's delay is the one beyond it.
-Zero zeroOf(const Refitted& refitted, double known_mm);
+/// `tells_delay`: whether the captures can; otherwise there is none.
+Zero zeroOf(const Refitted& refitted, double known_mm, bool tells_delay = true);
+
+/// Whether captures are of so many places, three, that what a delay of the light does is told from what else the model
+/// lacks: in one image both are some curve over the range.
+bool tellDelay(const std::vector<MeasuredCapture>& captures);
 
 /// The delay of the light that fits best, offset and gain being free, in millimetres: what it does to the cyclic error
-/// is not proportional to it. 0 where it is an offset of the range and nothing else, or no more than chance.
+/// is not proportional to it. 0 where it is an offset of the range and nothing else, no more than chance, or not told.
 Result<double> delayThatFits(const JudgedCampaign& judged);
 
 /// Light traced again where the cameras probably stood, if these were their effects: what a place off the

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "calib/compare/stack.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/light_tiles.h"
 #include "calib/discover/campaign/places.h"
@@ -75,10 +76,22 @@ Result<Evidence> residualEvidence(const JudgedCampaign& judged, const std::vecto
   return evidence;
 }
 
+bool tellDelay(const std::vector<MeasuredCapture>& captures) {
+  constexpr std::size_t kEnough = 3;
+  std::vector<Transform<World, Camera>> places;
+  for (const MeasuredCapture& capture : captures) {
+    const auto& pose = capture.moment.world_from_camera;
+    const auto isThere = [&](const auto& place) { return pose && compare::samePose(*pose, place); };
+    if (pose && std::ranges::none_of(places, isThere)) places.push_back(*pose);
+  }
+  return places.size() >= kEnough;
+}
+
 Result<double> delayThatFits(const JudgedCampaign& judged) {
   constexpr double kStep_mm = 2.0, kMost_mm = 100.0, kDone_mm = 0.1;
   const sim::SensorModel& model = judged.declared.model;
   if (model.traceRequest().frequencies.empty()) return 0.0;  // a pulsed camera's gates know no cyclic error
+  if (!tellDelay(judged.lit.captures)) return 0.0;
   const auto as_declared = effectsWithoutNoise(model);
   const auto is_told = isDelayNoOffset(judged, as_declared);
   if (!is_told) return is_told.error();

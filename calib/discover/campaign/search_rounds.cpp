@@ -185,7 +185,7 @@ Result<> fitFound(const Declared& file, const CampaignRows* file_rows, const Ope
   if (!refitted) return refitted.error();
   round.refitted = *std::move(refitted);
   takeFitted(updated, round);
-  round.zero = zeroOf(round.refitted, round.declared.delay_mm);
+  round.zero = zeroOf(round.refitted, round.declared.delay_mm, tellDelay(open.captures));
   return {};
 }
 
