@@ -35,6 +35,8 @@ Result<TableDiscovery> discoverTable(const std::filesystem::path& file, const Ta
 
 /// The nuisances by their sessions' names; sessions without open rows have none.
 std::vector<Estimate> namedNuisances(const TableDiscovery& discovery);
+/// "mm", or of the gain "mm per m"; empty where the headers say none.
+std::string unitOfNuisance(const TableDiscovery& discovery, const std::string& name);
 
 /// One sentence: what came out.
 std::string verdictOf(const TableDiscovery& discovery);

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/compare/statistics.h"
 #include "calib/discover/curve.h"
 #include "calib/discover/discover_table.h"
 #include "calib/discover/table_words.h"
@@ -124,10 +125,13 @@ std::string modelToml(const TableDiscovery& discovery) {
   out += fmt::format("data = {}\nopen_rows = {}\nlocked_rows = {}\nlocked_sha256 = \"{}\"\nunit = {}\n",
                      settings::toToml(discovery.open.file.filename().string()), discovery.open.rows(),
                      discovery.locked.rows(), discovery.judged.sha256, settings::toToml(discovery.open.unit));
+  if (!discovery.open.reference.empty())
+    out += fmt::format("reference = {}\nreference_median = {}\n", settings::toToml(discovery.open.reference_name),
+                       settings::toToml(compare::quantile(discovery.open.reference, 0.5)));
   for (const Estimate& nuisance : namedNuisances(discovery)) {
-    out += fmt::format("\n[[nuisance]]\nname = {}\nvalue = {}\nstandard_error = {}\n",
+    out += fmt::format("\n[[nuisance]]\nname = {}\nvalue = {}\nstandard_error = {}\nunit = {}\n",
                        settings::toToml(nuisance.name), settings::toToml(nuisance.value),
-                       settings::toToml(nuisance.error));
+                       settings::toToml(nuisance.error), settings::toToml(unitOfNuisance(discovery, nuisance.name)));
   }
   if (const std::string held = containedInWords(discovery); !held.empty()) out += fmt::format("\n# {}.\n", held);
   for (const Effect& effect : discovery.finding.effects) out += effectToml(discovery, effect);

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "calib/discover/curve.h"
+#include "calib/discover/headers.h"
 #include "calib/discover/table_words.h"
 #include "protocol/types/counted.h"
 
@@ -150,9 +151,9 @@ Section dataSection(const TableDiscovery& d) {
         alike.best.correlation.neighbour, d.noise.correlationRows())});
   }
   TableBlock nuisances{
-      "Nuisances, fitted along and never counted as effects", {"nuisance", "value", "standard error"}, {}};
+      "Nuisances, fitted along and never counted as effects", {"nuisance", "value", "standard error", "unit"}, {}};
   for (const Estimate& one : namedNuisances(d))
-    nuisances.rows.push_back({one.name, significant(one.value), significant(one.error)});
+    nuisances.rows.push_back({one.name, significant(one.value), significant(one.error), unitOfNuisance(d, one.name)});
   section.blocks.push_back(std::move(nuisances));
   if (const std::string held = containedInWords(d); !held.empty()) section.blocks.push_back(Paragraph{held});
   TableBlock scores{
@@ -190,6 +191,12 @@ std::vector<Estimate> namedNuisances(const TableDiscovery& d) {
     if (std::isfinite(one.error)) named.push_back(std::move(one));
   }
   return named;
+}
+
+std::string unitOfNuisance(const TableDiscovery& d, const std::string& name) {
+  const std::string of_reference = unitOf(d.open.reference_name);
+  if (name != "gain" || d.open.unit.empty() || of_reference.empty()) return name == "gain" ? "" : d.open.unit;
+  return fmt::format("{} per {}", d.open.unit, of_reference);
 }
 
 /// What was strongest in the first test, where it predicts nothing.

@@ -17,7 +17,7 @@ namespace {
 std::string sizeOf(const TableDiscovery& d, const Effect& effect) {
   const auto values = effectIn(d.open, effect);
   const auto [least, most] = std::ranges::minmax(values);
-  return fmt::format("by up to {}{}", compare::shown(most - least, decimalsOf(d)), unitOf(d));
+  return fmt::format("by up to {}{} between rows", compare::shown(most - least, decimalsOf(d)), unitOf(d));
 }
 
 /// " between 500 and 1000": of a step, the rows on both sides.

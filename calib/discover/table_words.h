@@ -22,7 +22,7 @@ std::string significant(double value);
 /// A value of a covariate as its column has it: of a time the date.
 std::string placeInWords(const TableDiscovery& discovery, const std::string& covariate, double x);
 bool isCertain(const Effect& effect);
-/// "it goes with time_s (exponential in time_s), by up to 3.1 mm, or with …"
+/// "it goes with time_s (exponential in time_s), by up to 3.1 mm between rows, or with …"
 std::string nameInWords(const TableDiscovery& discovery, const Effect& effect);
 /// Whether most of what rows err by goes slowly from one to the next.
 bool wanders(const TableDiscovery& discovery);
