@@ -242,6 +242,8 @@ double lengthFactor(const std::string& from, const std::string& to) {
 
 bool isLengthOrNone(const std::string& unit) { return unit.empty() || unitsPerMetre(unit); }
 
+bool saysWord(const std::string& header, const std::vector<std::string_view>& words) { return hasWord(header, words); }
+
 bool namesTarget(const std::string& header) { return hasWord(header, kTarget); }
 
 bool isPixelNumber(const std::string& header) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -41,6 +42,8 @@ double lengthFactor(const std::string& from, const std::string& to);
 std::optional<double> unitsPerMetre(const std::string& unit);
 bool isLengthOrNone(const std::string& unit);
 
+/// Whether one of a header's words, in small letters, is one of these.
+bool saysWord(const std::string& header, const std::vector<std::string_view>& words);
 /// Whether a header says what was looked at: "target_m", "plane", "nominal_mm".
 bool namesTarget(const std::string& header);
 

@@ -8,6 +8,7 @@
 #include "calib/compare/statistics.h"
 #include "calib/discover/curve.h"
 #include "calib/discover/discover_table.h"
+#include "calib/discover/table_camera.h"
 #include "calib/discover/table_words.h"
 #include "protocol/settings/describe.h"
 
@@ -41,8 +42,8 @@ std::vector<double> bendsOf(const TableDiscovery& discovery, const Effect& effec
 
 /// Between the points the effect is nearly straight: at equal distances, as many rows apart, and where it
 /// bends.
-std::vector<double> pointsOf(const TableDiscovery& discovery, const Effect& effect, const std::string& name,
-                             std::size_t count) {
+std::vector<double> pointsAlong(const TableDiscovery& discovery, const Effect& effect, const std::string& name,
+                                std::size_t count) {
   const auto info = std::ranges::find(discovery.infos, name, &CovariateInfo::name);
   if (info == discovery.infos.end()) return {};
   if (!info->levels.empty()) return info->levels;
@@ -63,11 +64,10 @@ std::vector<double> pointsOf(const TableDiscovery& discovery, const Effect& effe
 /// The effect over a grid of its covariates, the last one fastest, above its mean over the open rows: what it
 /// would be with another offset is no part of it.
 std::string tableOf(const TableDiscovery& discovery, const Effect& effect) {
-  const std::size_t count = effect.covariates.size() == 1 ? kTablePoints : kSurfacePoints;
   std::vector<std::map<std::string, double>> grid(1);
   std::string out = "  [effect.table]\n";
   for (const std::string& name : effect.covariates) {
-    const auto points = pointsOf(discovery, effect, name, count);
+    const auto points = pointsOf(discovery, effect, name);
     std::vector<std::map<std::string, double>> longer;
     for (const auto& at : grid) {
       for (const double x : points) {
@@ -117,6 +117,10 @@ std::string effectToml(const TableDiscovery& discovery, const Effect& effect) {
 }
 
 }  // namespace
+
+std::vector<double> pointsOf(const TableDiscovery& discovery, const Effect& effect, const std::string& covariate) {
+  return pointsAlong(discovery, effect, covariate, effect.covariates.size() == 1 ? kTablePoints : kSurfacePoints);
+}
 
 std::string modelToml(const TableDiscovery& discovery) {
   std::string out = fmt::format(

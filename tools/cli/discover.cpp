@@ -2,12 +2,15 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <fstream>
 #include <memory>
+#include <optional>
 #include <string>
 #include <system_error>
 
 #include "calib/discover/campaign/before_search.h"
 #include "calib/discover/discover_table.h"
+#include "calib/discover/table_camera.h"
 #include "tools/cli/arguments.h"
 #include "tools/cli/command.h"
 #include "tools/cli/discover_campaign.h"
@@ -37,11 +40,23 @@ Result<> check(const Options& options) {
       return Error{Error::Code::InvalidArgument, "--map is for a table, not for a run or a recording"};
     return options.campaign.check(options.data);
   }
-  if (!options.campaign.isGiven()) return {};
+  if (!options.campaign.isGivenForRuns()) return {};
   return Error{
       Error::Code::InvalidArgument,
-      fmt::format("{} is no folder and no recording (.mcap): --model, --scene and their like are for these",
-                  options.data)};
+      fmt::format("{} is no folder and no recording (.mcap): --scene and its like are for these", options.data)};
+}
+
+/// The camera with what was found, beside the page.
+Result<> writeCamera(const discover::TableDiscovery& discovery, const discover::CameraText& camera,
+                     const std::filesystem::path& folder) {
+  const auto mended = discover::cameraWith(discovery, camera);
+  if (!mended) return mended.error();
+  for (const std::string& note : mended->notes) fmt::print("note: {}\n", note);
+  const auto file = folder / "camera.toml";
+  std::ofstream out{file, std::ios::binary | std::ios::trunc};
+  out << mended->toml << std::flush;
+  if (!out) return Error{Error::Code::StorageFull, fmt::format("{}: cannot be written", file.string())};
+  return {};
 }
 
 Result<Exit> act(const Options& options) {
@@ -55,11 +70,19 @@ Result<Exit> act(const Options& options) {
     if (!loaded) return loaded.error();
     map = *std::move(loaded);
   }
+  std::optional<discover::CameraText> camera;
+  if (!options.campaign.model.empty()) {
+    auto loaded = discover::loadCamera(options.campaign.model);
+    if (!loaded) return loaded.error();
+    camera = *std::move(loaded);
+  }
   const auto discovery = discover::discoverTable(options.data, map);
   if (!discovery) return discovery.error();
   const auto page = discover::writeDiscovery(*discovery, options.output);
   if (!page) return page.error();
   for (const auto& doubt : discovery->open.doubts) fmt::print("note: {}\n", doubt);
+  if (camera)
+    if (auto written = writeCamera(*discovery, *camera, options.output); !written) return written.error();
   fmt::print("{}\n{}\n", discover::verdictOf(*discovery), page->string());
   return Exit::Ok;
 }
@@ -73,7 +96,7 @@ Run add(Arguments& args) {
       .required();
   args.option("--map", options->map,
               "of a table: TOML file that says what the columns are; without it the headers do");
-  args.option("-o,--output", options->output, "folder for the report, report.json and model.toml")
+  args.option("-o,--output", options->output, "folder for the report, report.json and model.toml; of a table with --model: camera.toml, too")
       .showsDefault();
   options->campaign.add(args);
   args.check([options] { return check(*options); });
@@ -87,6 +110,7 @@ Command discoverCommand() {
   return {"discover", "find what measured errors go with, and how much of them that explains",
           "  toftwin discover warmup.csv -o out                  headers say what the columns are\n"
           "  toftwin discover distances.csv --map map.toml -o out\n"
+          "  toftwin discover warmup.csv --model preset:kinect_v2 -o out         and camera.toml, which the simulator runs\n"
           "  toftwin discover run --model camera.toml --scene wall.toml -o out   what toftwin "
           "measure captured\n"
           "  toftwin discover kinect.mcap --model camera.toml --scene wall.toml -o out\n",

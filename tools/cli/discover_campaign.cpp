@@ -43,7 +43,7 @@ Result<discover::CampaignJob> jobOf(const std::string& run, const std::string& o
 
 void CampaignOptions::add(Arguments& args) {
   args.option("--model", model,
-              "of a run or a recording: the camera file that is to be mended, or a preset (preset:NAME)");
+              "the camera file that is to be mended, or a preset (preset:NAME); a run or a recording needs it");
   args.option("--scene", scene, "of a run or a recording: the scene file of what the camera looked at");
   args.option("--poses", poses, "of a recording: another one, whose frames say where the camera stood");
   args.option("--scene-of", scenes_of,
@@ -84,8 +84,8 @@ Result<> CampaignOptions::check(const std::string& data) const {
   return {};
 }
 
-bool CampaignOptions::isGiven() const {
-  return !model.empty() || !poses.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked ||
+bool CampaignOptions::isGivenForRuns() const {
+  return !poses.empty() || !scene.empty() || !scenes_of.empty() || is_b || keep_locked ||
          !without.empty();
 }
 

@@ -23,8 +23,8 @@ struct CampaignOptions {
   void add(Arguments& args);
   /// What is missing for this run or recording, or is for the other of the two.
   [[nodiscard]] Result<> check(const std::string& data) const;
-  /// Whether any of them was given.
-  [[nodiscard]] bool isGiven() const;
+  /// Whether any of them was given that a table does not take.
+  [[nodiscard]] bool isGivenForRuns() const;
 };
 
 /// Searches the run and leaves its report in the folder.

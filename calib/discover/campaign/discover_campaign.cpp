@@ -5,10 +5,10 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
-#include <sstream>
 
 #include <fmt/format.h>
 
+#include "calib/discover/camera_text.h"
 #include "calib/discover/campaign/before_search.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/found_model.h"
@@ -40,33 +40,15 @@ struct DeclaredFiles {
   std::string text;  ///< of the camera file
 };
 
-Result<std::string> textOf(const std::filesystem::path& file) {
-  std::ifstream in{file, std::ios::binary};
-  std::ostringstream text;
-  if (in) text << in.rdbuf();
-  if (in) return text.str();
-  return Error{Error::Code::NotFound, fmt::format("{}: cannot be read", file.string())};
-}
-
 // GCC 12 takes the emptied map of what was moved for one that never was.
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 Result<DeclaredFiles> loadDeclared(const CampaignJob& job) {
-  constexpr std::string_view kPreset = "preset:";  // as `toftwin info` has it
-  const auto names = sim::SensorModel::presetNames();
-  const std::string name = job.model.starts_with(kPreset) ? job.model.substr(kPreset.size()) : job.model;
-  const bool is_preset = std::ranges::find(names, name) != names.end();
-  auto text = is_preset ? sim::SensorModel::presetText(name) : textOf(job.model);
-  if (!text) {
-    return Error{text.error().code,
-                 fmt::format("{}; --model takes a camera file or one of the presets {}",
-                             text.error().message, fmt::join(names, ", "))};
-  }
-  auto model = sim::SensorModel::parse(*text, is_preset ? name + ".toml" : job.model);
-  if (!model) return model.error();
+  auto camera = loadCamera(job.model);
+  if (!camera) return camera.error();
   auto scene = sim::Scene::load(job.scene);
   if (!scene) return scene.error();
-  DeclaredFiles files{{*std::move(model), *std::move(scene)}, *std::move(text)};
+  DeclaredFiles files{{std::move(camera->model), *std::move(scene)}, std::move(camera->text)};
   for (const auto& [block, file] : job.scene_of_block) {
     auto other = sim::Scene::load(file);
     if (!other) return other.error();
