@@ -131,8 +131,11 @@ std::optional<FittedEffect> zeroOf(const TableDiscovery& d, double to_mm, std::v
     if (one.name == "offset") offset = one.value;
     if (one.name == "gain") gain = one.value;
   }
-  if (!offset) notes.emplace_back("each session has an offset of its own: camera.toml has none");
-  for (const Effect& effect : d.finding.effects) *offset += offset ? levelOf(effect, d.open).value : 0.0;
+  if (offset) {
+    for (const Effect& effect : d.finding.effects) *offset += levelOf(effect, d.open).value;
+  } else {
+    notes.emplace_back("each session has an offset of its own: camera.toml has none");
+  }
   const auto per_metre = unitsPerMetre(discover::unitOf(d.open.reference_name));
   if (d.open.reference.empty() || !per_metre) {
     if (!offset) return std::nullopt;

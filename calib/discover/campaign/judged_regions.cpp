@@ -1,10 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/discover/campaign/judged_regions.h"
 
-#include <array>
 #include <cmath>
-
-#include <fmt/format.h>
 
 #include "calib/compare/characteristics.h"
 #include "calib/compare/statistics.h"
