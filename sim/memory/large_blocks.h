@@ -1,0 +1,62 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <cstddef>
+#include <cstdint>
+#include <mutex>
+#include <optional>
+
+namespace toftwin::sim {
+
+/// Memory for what is large, images and meshes, on the processor's large pages where the kernel gives them to those
+/// who ask (transparent huge pages: `always` or `madvise`). An image then takes one or two entries of the processor's
+/// table of pages, not hundreds; and what one frame gives back the next one takes, without the kernel, which would
+/// clear every page anew. Thread-safe.
+///
+/// All of it lies in one range of addresses, cut into chunks. A block is the first free place that is large enough,
+/// and places that are given back are one with the free ones beside them. One chunk without blocks is kept, the memory
+/// of others goes back to the kernel.
+class LargeBlocks {
+ public:
+  static constexpr std::size_t kPage = std::size_t{2} << 20;    ///< bytes, of the large ones
+  static constexpr std::size_t kUnit = std::size_t{16} << 10;   ///< of which blocks are multiples
+  static constexpr std::size_t kChunk = std::size_t{32} << 20;
+  static constexpr std::size_t kLeast = std::size_t{32} << 10, kMost = kChunk / 2;  ///< of a block
+
+  LargeBlocks() = default;
+  ~LargeBlocks();
+  LargeBlocks(const LargeBlocks&) = delete;
+  LargeBlocks& operator=(const LargeBlocks&) = delete;
+
+  /// At least so many bytes, of no certain content, that begin at a multiple of kUnit; nullptr if it is not for
+  /// kLeast to kMost bytes, or where there are none left.
+  void* take(std::size_t bytes);
+  /// Whether take() gave it.
+  [[nodiscard]] bool has(const void* block) const;
+  void give(void* block);
+  /// Chunks whose memory is not the kernel's.
+  [[nodiscard]] std::size_t chunksHeld() const;
+
+ private:
+  /// What a chunk begins with; all zero if it is empty.
+  struct Chunk {
+    std::uint32_t used;  ///< units
+    std::uint16_t length[kChunk / kUnit];  ///< by unit: of the block that begins there, or 0
+  };
+  static_assert(sizeof(Chunk) <= kUnit);
+
+  bool reserve();
+  [[nodiscard]] Chunk& chunk(std::size_t number) const;
+
+  mutable std::mutex mutex_;
+  std::atomic<std::byte*> begin_ = nullptr;  ///< of the range, once there is one
+  std::size_t opened_ = 0;                   ///< chunks that ever had a block
+  std::optional<std::size_t> spare_;         ///< the one that has none, and whose memory is kept
+  bool is_refused_ = false;
+};
+
+/// Asks for large pages for what lies in so many bytes from a multiple of LargeBlocks::kPage on.
+void wantLargePages(void* memory, std::size_t bytes);
+
+}  // namespace toftwin::sim
