@@ -224,7 +224,7 @@ class SimulatedSource final : public Source {
     model_ = std::move(changed);
     operating_ = std::move(operating);
     view_.setFrequencies(model_.traceRequest().frequencies,
-                         model_.hasPhasors() ? model_.correlatedTerms() : std::vector<std::uint8_t>{});
+                         model_.hasPhasors() ? model_.correlatedTerms() : std::vector<sim::Harmonic>{});
     info_.planes = planesNow();
     collected_.reset();
     return {};

@@ -28,14 +28,14 @@ void View::setPose(const Transform<World, Camera>& world_from_camera) {
   forget();
 }
 
-void View::setFrequencies(std::vector<Frequency> frequencies, std::vector<std::uint8_t> wanted) {
+void View::setFrequencies(std::vector<Frequency> frequencies, std::vector<sim::Harmonic> seen) {
   if (frequencies == request_.frequencies) return;
   request_.frequencies = std::move(frequencies);
   own_ = {};
   foreign_.assign(foreign_.size(), {});
   if (!realtime_) return;
   realtime_light_ = nullptr;
-  goRealtime(std::move(wanted));
+  goRealtime(std::move(seen));
 }
 
 void View::moveTo(Duration time, std::uint64_t number) {
@@ -46,15 +46,15 @@ void View::moveTo(Duration time, std::uint64_t number) {
   forget();
 }
 
-void View::goRealtime(std::vector<std::uint8_t> wanted) {
+void View::goRealtime(std::vector<sim::Harmonic> seen) {
   realtime_.emplace();
-  wanted_ = std::move(wanted);
+  seen_ = std::move(seen);
 }
 
 void View::traceFrame(Duration time) {
   sim::TraceRequest request = request_;
   request.world_from_camera = poseAt(time);
-  realtime_light_ = &realtime_->next(scene_.moves() ? scene_.at(time) : scene_, request, wanted_);
+  realtime_light_ = &realtime_->next(scene_.moves() ? scene_.at(time) : scene_, request, seen_);
 }
 
 bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const {

@@ -34,7 +34,7 @@ class View {
   void setPose(const Transform<World, Camera>& world_from_camera);
 
   /// Looks with those frequencies from now on, of which those phasors are wanted in real time.
-  void setFrequencies(std::vector<Frequency> frequencies, std::vector<std::uint8_t> wanted);
+  void setFrequencies(std::vector<Frequency> frequencies, std::vector<sim::Harmonic> seen);
 
   /// Whether raw exposures see different light: scene or camera move, or another camera's light beats.
   [[nodiscard]] bool changesWithTime() const { return moves() || !scene_.foreignEmitters().empty(); }
@@ -51,7 +51,7 @@ class View {
   [[nodiscard]] const sim::Light& light() const { return realtime_light_ != nullptr ? *realtime_light_ : own_.light; }
 
   /// From now on light is traced frame by frame, those of its phasors that are wanted.
-  void goRealtime(std::vector<std::uint8_t> wanted);
+  void goRealtime(std::vector<sim::Harmonic> seen);
   [[nodiscard]] bool isRealtime() const { return realtime_.has_value(); }
   /// Traces the light of one frame, as it is at a time since device time 0.
   void traceFrame(Duration time);
@@ -75,7 +75,7 @@ class View {
   bool complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const;
   void forget();
   std::optional<sim::RealtimeTracer> realtime_;
-  std::vector<std::uint8_t> wanted_;                ///< in real time
+  std::vector<sim::Harmonic> seen_;                ///< in real time
   const sim::Light* realtime_light_ = nullptr;      ///< the tracer's
   Pass own_;
   std::vector<Pass> foreign_{scene_.foreignEmitters().size()};

@@ -239,13 +239,13 @@ struct ScatteredRows::Impl {
   std::optional<ScatteredImage> ambient;  ///< if there is any
 };
 
-ScatteredRows::ScatteredRows(const LensScatter& lens, const Light& light, std::span<const std::uint8_t> wanted) {
+ScatteredRows::ScatteredRows(const LensScatter& lens, const Light& light, std::span<const Harmonic> seen) {
   auto impl = std::make_unique<Impl>(Impl{light, {}, {light.steady, lens}, {}});
   if (std::ranges::any_of(light.ambient.pixels(), [](float radiance) { return radiance != 0.0F; }))
     impl->ambient.emplace(light.ambient, lens);
   for (std::size_t term = 0; term < light.phasors.size(); ++term) {
     auto& scattered = impl->phasors.emplace_back();
-    if (!light.phasors[term].empty() && wanted[term] != 0) scattered.emplace(light.phasors[term], lens);
+    if (!light.phasors[term].empty() && seen[term] != Harmonic::Unseen) scattered.emplace(light.phasors[term], lens);
   }
   impl_ = std::move(impl);
 }

@@ -51,8 +51,8 @@ bool goesByRows(const LensScatter& lens);
 /// light as long as it lives; may be read from many threads.
 class ScatteredRows {
  public:
-  /// Of the phasors for which `wanted` is not 0.
-  ScatteredRows(const LensScatter& lens, const Light& light, std::span<const std::uint8_t> wanted);
+  /// Of the phasors that are seen.
+  ScatteredRows(const LensScatter& lens, const Light& light, std::span<const Harmonic> seen);
   ~ScatteredRows();
 
   /// A strip of so many rows to write into; what is not wanted is an empty image.

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <complex>
+#include <cstdint>
 #include <vector>
 
 #include <toftwin/geometry.h>
@@ -24,6 +25,10 @@ struct ModulationError {
   /// By how much step k is late, of every frequency; steps beyond the last are exact.
   std::vector<float> step_rad;
 };
+
+/// How much of a harmonic of the light a camera sees. Faint is what its overtones have less of than a twentieth of what the
+/// fundamental has.
+enum class Harmonic : std::uint8_t { Unseen, Faint, Seen };
 
 /// The light that reaches each pixel from the camera's own emitters, before any electronics.
 ///

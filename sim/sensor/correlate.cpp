@@ -13,6 +13,8 @@ namespace {
 
 /// A harmonic whose relative content is smaller is not there.
 constexpr double kNoContent = 1e-12;
+/// One below this is faint (Harmonic).
+constexpr double kFaintContent = 0.05;
 
 /// modulated += Re(weight · phasors), whose parts alternate.
 TOFTWIN_SIMD void addModulated(const float* __restrict phasors, float real, float imaginary, int width,
@@ -61,11 +63,15 @@ std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
   return relative;
 }
 
-std::vector<std::uint8_t> correlatedTerms(const std::vector<Response>& responses, int harmonics) {
-  std::vector<std::uint8_t> seen;
+std::vector<Harmonic> correlatedTerms(const std::vector<Response>& responses, int harmonics) {
+  std::vector<Harmonic> seen;
   for (const Response& response : responses) {
-    for (std::size_t i = 0; i < static_cast<std::size_t>(harmonics); ++i)
-      seen.push_back(i < response.harmonics.size() && std::abs(response.harmonics[i]) >= kNoContent ? 1 : 0);
+    for (std::size_t i = 0; i < static_cast<std::size_t>(harmonics); ++i) {
+      const double content = i < response.harmonics.size() ? std::abs(response.harmonics[i]) : 0.0;
+      seen.push_back(content < kNoContent      ? Harmonic::Unseen
+                     : content < kFaintContent ? Harmonic::Faint
+                                               : Harmonic::Seen);
+    }
   }
   return seen;
 }
@@ -78,9 +84,9 @@ Light correlatedPart(const Light& light, const std::vector<Response>& responses,
     part.phasors = light.phasors;
   } else {
     part.phasors.resize(light.phasors.size());
-    const std::vector<std::uint8_t> seen = correlatedTerms(responses, light.harmonics);
+    const std::vector<Harmonic> seen = correlatedTerms(responses, light.harmonics);
     for (std::size_t term = 0; term < seen.size(); ++term) {
-      if (seen[term] != 0) part.phasors[term] = light.phasors[term];
+      if (seen[term] != Harmonic::Unseen) part.phasors[term] = light.phasors[term];
     }
   }
   part.steady = light.steady;

@@ -31,8 +31,8 @@ std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
                                                     const Waveform& demodulating,
                                                     Frequency frequency, int count);
 
-/// Which of the light's phasors, in their order, correlate() looks at: those that a response holds.
-std::vector<std::uint8_t> correlatedTerms(const std::vector<Response>& responses, int harmonics);
+/// How correlate() sees the light's phasors, in their order, by what the responses hold of them.
+std::vector<Harmonic> correlatedTerms(const std::vector<Response>& responses, int harmonics);
 
 /// A copy of the light to be changed by effects, without what correlate() would not look at: harmonics that
 /// no response holds are empty images, unless `all_harmonics` are asked for.

@@ -162,9 +162,9 @@ std::optional<LensPair> SensorModel::colorLens() const {
 
 bool SensorModel::hasPhasors() const { return !impl_->file.isPulsed(); }
 
-std::vector<std::uint8_t> SensorModel::correlatedTerms() const {
+std::vector<Harmonic> SensorModel::correlatedTerms() const {
   const auto harmonics = static_cast<std::size_t>(impl_->file.sampling.harmonics);
-  if (impl_->addsHarmonics()) return std::vector<std::uint8_t>(impl_->responses.size() * harmonics, 1);
+  if (impl_->addsHarmonics()) return std::vector<Harmonic>(impl_->responses.size() * harmonics, Harmonic::Seen);
   return sim::correlatedTerms(impl_->responses, impl_->file.sampling.harmonics);
 }
 

@@ -69,8 +69,8 @@ class SensorModel {
   [[nodiscard]] std::optional<LensPair> colorLens() const;
   /// Whether it demodulates; a pulsed camera has no phasors.
   [[nodiscard]] bool hasPhasors() const;
-  /// Which phasors of the light collect() looks at, in the order of Light::phasors; the others may be empty images.
-  [[nodiscard]] std::vector<std::uint8_t> correlatedTerms() const;
+  /// How collect() sees the phasors of the light, in their order; those unseen may be empty images.
+  [[nodiscard]] std::vector<Harmonic> correlatedTerms() const;
   /// The raw exposures of a frame that starts at `start`: frequency by frequency, step by step.
   [[nodiscard]] std::vector<Exposure> exposures(DeviceTime start) const;
   /// From the start of a frame's first raw exposure to the end of its last.

@@ -12,13 +12,13 @@ namespace toftwin::sim {
 namespace {
 
 /// Most samples in a coarse point's means; what moves in a scene leaves its light behind for so long.
-constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 64.0f;
-constexpr float kFewestSamples = 8.0f;
+constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 48.0f;
+constexpr float kFewestSamples = 6.0f;
 /// The same of what lit places send to what stands still: it is known well from one frame alone, and moves with the
 /// shadows. (Moving objects may be bent, which leaves few neighbours to smooth over.)
-constexpr float kMostOfLitWhereThingsMove = 4.0f;
+constexpr float kMostOfLitWhereThingsMove = 2.0f;
 /// Of all light on what moves, which moves through it, and whose points are means of several before.
-constexpr float kMostOfWhatMoves = 24.0f;
+constexpr float kMostOfWhatMoves = 16.0f;
 /// Cells remember so many times the samples.
 constexpr int kCellsPerPoints = 2, kCellsWhereThingsMove = 4;
 /// Light is remembered for so much of the camera's way: its emitters move with it, which turns phasors.
@@ -125,13 +125,13 @@ void CoarseGrid::resizeWithLit(int new_width, int new_height, std::size_t channe
   mover = Image<int>(width, height);
 }
 
-Channels::Channels(const TraceRequest& request, std::span<const std::uint8_t> wanted) {
+Channels::Channels(const TraceRequest& request, std::span<const Harmonic> seen, Harmonic least) {
   const auto harmonics = static_cast<std::size_t>(request.harmonics);
   for (std::size_t term = 0; term < request.frequencies.size() * harmonics; ++term) {
     const bool is_first = term % harmonics == 0;
     if (is_first) firsts_.push_back(terms_.size());
     if (is_first) last_orders_.push_back(1);
-    if (!is_first && !wanted.empty() && wanted[term] == 0) continue;
+    if (!is_first && !seen.empty() && seen[term] < least) continue;
     terms_.push_back(term);
     const int order = last_orders_.back() = static_cast<int>(term % harmonics) + 1;
     orders_of_terms_.push_back(order);

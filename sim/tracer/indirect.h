@@ -39,8 +39,8 @@ struct CoarseGrid {
 /// every frequency the first harmonic is.
 class Channels {
  public:
-  /// `wanted` by term of the request (Light::phasors); empty: all.
-  explicit Channels(const TraceRequest& request = {}, std::span<const std::uint8_t> wanted = {});
+  /// Those that are at least so well seen, by term of the request (Light::phasors); if `seen` is empty, all.
+  explicit Channels(const TraceRequest& request = {}, std::span<const Harmonic> seen = {}, Harmonic least = Harmonic::Faint);
   bool operator==(const Channels&) const = default;
 
   static constexpr std::size_t kSteady = 0, kAmbient = 1;

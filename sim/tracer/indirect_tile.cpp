@@ -13,10 +13,13 @@ namespace toftwin::sim {
 namespace {
 
 /// Random dimensions of their own, beyond those of trace().
-constexpr std::uint32_t kBounce = 0x10000, kPick = kBounce + 2;
-/// One tile in so many looks a surface further in each frame, in turns: cells are larger than tiles and
-/// remember.
-constexpr std::uint32_t kFurtherEvery = 2;
+constexpr std::uint32_t kBounce = 0x10000, kPick = kBounce + 2, kRoulette = kBounce + 3;
+/// So many rays of each sample say what is in the way of lit places: they cost less than a direction does, which meets a surface
+/// that is to be lit, and leave as much noise.
+constexpr std::uint32_t kRaysToLit = 2;
+/// Of direct light that lit places leave less than this share of, so much is left to chance that what survives has this share:
+/// away from corners that is nearly all, and what is dropped needs no ray to the emitter.
+constexpr float kLeastShare = 0.05f;
 /// Rays to a light end before its surface by this share of their way.
 constexpr float kShortOfIt = 0.002f;
 
@@ -57,6 +60,20 @@ void startAnew(Packet& packet, Hits& hits) {
     hits.albedo[i] = hits.shape_a[i] = 1.0f;
     hits.shape_b[i] = 0.0f;
   }
+}
+
+/// Weighs light by shares of it; of small ones most are dropped, and the rest counts for them.
+TOFTWIN_VECTOR
+bool keepShares(const Packet& packet, const Lanes<float>& shares, DirectLight& light) {
+  int any = 0;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const float draw = independentPair(packet.key(i), packet.index[i], kRoulette).u * kLeastShare;
+    const float share = shares[i] >= kLeastShare ? shares[i] : draw < shares[i] ? kLeastShare : 0.0f;
+    light.weight[i] *= share;
+    light.valid[i] = share > 0.0f ? light.valid[i] : 0;
+    any |= light.valid[i];
+  }
+  return any != 0;
 }
 
 }  // namespace
@@ -114,18 +131,15 @@ void TileGatherer::gather(int i, int j, std::uint32_t first_sample, int samples,
   const Hits seen = hits_;
   normals_ = seen.normal;
   samples_ = samples;
-  const std::uint32_t turn =
-      static_cast<std::uint32_t>(i / 4 + j / 4) + first_sample / static_cast<std::uint32_t>(samples);
-  looks_further_ = turn % kFurtherEvery == 0;
   lookAtLights(camera_rays);
   for (int s = 0; s < samples; ++s) {
+    const std::uint32_t sample = first_sample + static_cast<std::uint32_t>(s);
     Packet packet = camera_rays;
-    for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
-      packet.index[lane] = numberInSequence(first_sample + static_cast<std::uint32_t>(s), lane);
-    }
+    for (std::size_t lane = 0; lane < kLaneCount; ++lane) packet.index[lane] = numberInSequence(sample, lane);
     hits_ = seen;
     clearSums(sums_);
-    if (lights_.areAny()) takeOffBlocked(packet, seen);
+    for (std::uint32_t ray = 0; lights_.areAny() && ray < kRaysToLit; ++ray)
+      takeOffBlocked(packet, sample * kRaysToLit + ray, seen);
     follow(packet, s == 0 ? &update : nullptr);
     keepSums(camera_rays.valid);
   }
@@ -140,10 +154,11 @@ void TileGatherer::lookAtLights(const Packet& camera_rays) {
   forEachChannel(fallen_, [&](std::size_t channel, const Lanes<float>& lanes) { tile_.lit[channel] = lanes; });
 }
 
-/// One of the lit points, picked by its share, says whether they are seen from here.
-void TileGatherer::takeOffBlocked(const Packet& packet, const Hits& seen) {
+/// One of the lit points, picked by its share, says whether they are seen from here, for one of a sample's rays.
+void TileGatherer::takeOffBlocked(const Packet& packet, std::uint32_t number, const Hits& seen) {
   Lanes<float> draws;
-  for (std::size_t i = 0; i < kLaneCount; ++i) draws[i] = randomPair(packet.key(i), packet.index[i], kPick).u;
+  for (std::size_t i = 0; i < kLaneCount; ++i)
+    draws[i] = randomPair(packet.key(i), numberInSequence(number, i), kPick).u;
   Lanes<int> picked, valid, is_blocked;
   lights_.pick(shares_, draws, picked);
   Vec3Lanes places;
@@ -157,7 +172,7 @@ void TileGatherer::takeOffBlocked(const Packet& packet, const Hits& seen) {
   if (!isAny(valid)) return;
   castShadowRays(tracing_.scene, valid.v, rays, false);
   for (std::size_t i = 0; i < kLaneCount; ++i) is_blocked[i] = (valid[i] != 0) & (rays.tfar[i] < 0.0f) ? -1 : 0;
-  if (isAny(is_blocked)) lights_.takeOff(tracing_, channels_, shares_, picked, is_blocked, found_, sums_);
+  if (isAny(is_blocked)) lights_.takeOff(tracing_, channels_, shares_, picked, is_blocked, 1.0f / kRaysToLit, found_, sums_);
 }
 
 /// Finds the coarse points themselves.
@@ -197,7 +212,6 @@ void TileGatherer::follow(Packet& packet, CellUpdate* update) {
     weight[i] = is_unknown[i] != 0 ? packet.throughput[i] * hits_.albedo[i] : 0.0f;
     length[i] = packet.length[i] + hits_.distance[i];
   }
-  if (!looks_further_ && !isAny(is_unknown)) return;
   lookFurther(packet);
   update->keys = keys;
   update->values[Channels::kSteady] = further_.steady;
@@ -230,11 +244,12 @@ bool TileGatherer::meet(Packet& packet, int surface, LaneSums& sums) {
 void TileGatherer::addDirect(const Packet& packet, LaneSums& sums) {
   Vec3Lanes places;
   DirectLight light;
-  Lanes<float> weight;
+  Lanes<float> shares;
   for (std::size_t e = 0; e < tracing_.emitters.size(); ++e) {
-    if (!findLightOf(tracing_, e, packet, hits_, 1, false, places, light)) continue;
-    lights_.leave(tracing_.emitters[e], packet, normals_, hits_, samples_, weight);
-    for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] *= weight[i];
+    if (!lookForLightOf(tracing_, e, packet, hits_, 1, places, light)) continue;
+    lights_.leave(tracing_.emitters[e], packet, normals_, hits_, samples_, shares);
+    if (!keepShares(packet, shares, light)) continue;
+    takeOffShadowed(tracing_, hits_, places, false, light);
     addLight(tracing_, light, sums);
   }
 }

@@ -24,14 +24,14 @@ class TileGatherer {
                const Channels& channels);
 
   /// The tile whose first point is (i, j): `samples` of each point, numbered from `first_sample` on; the
-  /// first of them also looks further, for the cells, where they know too little or it is the tile's turn.
+  /// first of them also looks a surface further, for the cells.
   void gather(int i, int j, std::uint32_t first_sample, int samples, CellUpdate& update);
   [[nodiscard]] const CoarseTile& tile() const { return tile_; }
 
  private:
   void lookFromCamera(int i, int j, Packet& camera_rays);
   void lookAtLights(const Packet& camera_rays);
-  void takeOffBlocked(const Packet& packet, const Hits& seen);
+  void takeOffBlocked(const Packet& packet, std::uint32_t number, const Hits& seen);
   void follow(Packet& packet, CellUpdate* update);
   bool meet(Packet& packet, int surface, LaneSums& sums);
   void addDirect(const Packet& packet, LaneSums& sums);
@@ -51,7 +51,6 @@ class TileGatherer {
   LitPoints::Shares shares_;
   Vec3Lanes normals_;  ///< of the coarse points
   int samples_ = 1;    ///< of each in this frame
-  bool looks_further_ = true;
   std::vector<Lanes<float>> found_;
   Hits hits_;
 };

@@ -67,23 +67,24 @@ bool KeptDirect::isStill(const BlockGeometry& pixels) const {
 }
 
 void DirectTracer::trace(const Block& block, KeptDirect& kept, std::size_t index) {
-  clearSums(sums);
   preparePacket(tracing_, block, packet_);
   startInTheMiddle(tracing_, block, packet_);
   if (!tracing_.scene.is_matt) {
+    clearSums(sums);
     followAll(tracing_, packet_, sums);
     traceTruth(tracing_, block, truth);
     return;
   }
   intersect(tracing_, packet_, rays_, true);
-  endMissed(tracing_.scene.ambient_radiance, rays_, packet_, sums.ambient);
+  Lanes<float>& ambient = kept.ambient(index);
+  ambient = {};
+  endMissed(tracing_.scene.ambient_radiance, rays_, packet_, ambient);
   findHits(tracing_.scene, packet_, rays_, hits_);
-  addEmission(packet_, hits_, sums.ambient);
-  kept.ambient(index) = sums.ambient;
+  addEmission(packet_, hits_, ambient);
   for (std::size_t e = 0; e < tracing_.emitters.size(); ++e) {
     DirectLight light;
     Vec3Lanes places;
-    if (findLightOf(tracing_, e, packet_, hits_, 0, true, places, light)) addLight(tracing_, light, sums);
+    findLightOf(tracing_, e, packet_, hits_, 0, true, places, light);
     kept.ways(index)[e] = {light.weight, light.length};
   }
   keepTruth(tracing_, packet_, hits_, truth);

@@ -67,9 +67,9 @@ class DirectTracer {
   explicit DirectTracer(const Tracing& tracing)
       : tracing_(tracing), sums(tracing.turns_per_metre.size() * tracing.orders.size()) {}
 
-  /// Traces a block, and keeps what recall() needs of it.
+  /// Traces a block. In a scene without special surfaces it keeps what recall() needs, in others `sums` have the light.
   void trace(const Block& block, KeptDirect& kept, std::size_t index);
-  /// The sums of a block that is kept.
+  /// The sums of a block that was traced, in this frame or before.
   void recall(KeptDirect& kept, std::size_t index);
 
  private:

@@ -255,15 +255,15 @@ void LitPoints::placesOf(const Lanes<int>& picked, Vec3Lanes& places) const {
 }
 
 void LitPoints::takeOff(const Tracing& tracing, const Channels& channels, const Shares& shares,
-                        const Lanes<int>& picked, const Lanes<int>& is_blocked, std::vector<Lanes<float>>& radiance,
-                        LaneSums& sums) const {
+                        const Lanes<int>& picked, const Lanes<int>& is_blocked, float part,
+                        std::vector<Lanes<float>>& radiance, LaneSums& sums) const {
   Lanes<float> weight{};
   Lanes<double> way{};
   radiance.assign(channels.count(), Lanes<float>{});
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     if (picked[i] < 0 || is_blocked[i] == 0) continue;
     const auto k = static_cast<std::size_t>(picked[i]);
-    weight[i] = -shares.total[i] / places_[k].radiance[Channels::kSteady][i];
+    weight[i] = -part * shares.total[i] / places_[k].radiance[Channels::kSteady][i];
     way[i] = static_cast<double>(shares.way[k][i]);
     for (std::size_t c = 0; c < radiance.size(); ++c) radiance[c][i] = places_[k].radiance[c][i];
   }

@@ -41,10 +41,10 @@ class LitPoints {
   /// One of them for each receiver, by its share of the total, from a number in [0, 1); −1: there is no light.
   void pick(const Shares& shares, const Lanes<float>& draws, Lanes<int>& picked) const;
   void placesOf(const Lanes<int>& picked, Vec3Lanes& places) const;
-  /// Takes all light off where `is_blocked`: the point that was picked stands for all. `room` is
+  /// Takes that part of all light off where `is_blocked`: the point that was picked stands for it. `room` is
   /// for a number of each channel.
   void takeOff(const Tracing& tracing, const Channels& channels, const Shares& shares, const Lanes<int>& picked,
-               const Lanes<int>& is_blocked, std::vector<Lanes<float>>& room, LaneSums& sums) const;
+               const Lanes<int>& is_blocked, float part, std::vector<Lanes<float>>& room, LaneSums& sums) const;
 
   /// The share n g / (q + n g) that is left to one of `directions` drawn by the cosine, for the light of emitter
   /// `e` on hits that such directions have met, seen from surfaces with these normals.

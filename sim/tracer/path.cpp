@@ -54,21 +54,30 @@ void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient) 
   }
 }
 
-bool findLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface,
-                 bool coherent, Vec3Lanes& places, DirectLight& light) {
+bool lookForLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface,
+                    Vec3Lanes& places, DirectLight& light) {
   const PlacedEmitter& emitter = tracing.emitters[e];
   drawPlaces(packet, emitter, dimensionsOf(tracing).emitter(surface, e), places);
   lightHits(packet, hits, emitter, places, light);
-  if (!isAny(light.valid)) {
-    light.weight = {};
-    light.length = {};
-    return false;
-  }
+  return isAny(light.valid);
+}
+
+void takeOffShadowed(const Tracing& tracing, const Hits& hits, const Vec3Lanes& places, bool coherent, DirectLight& light) {
   RTCRay16 rays;
   setShadowRays(hits, places, rays);
   record(tracing.log, light.valid, rays, coherent, true);
   castShadowRays(tracing.scene, light.valid.v, rays, coherent);
   for (std::size_t i = 0; i < kLaneCount; ++i) light.weight[i] = rays.tfar[i] < 0.0f ? 0.0f : light.weight[i];
+}
+
+bool findLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface,
+                 bool coherent, Vec3Lanes& places, DirectLight& light) {
+  if (!lookForLightOf(tracing, e, packet, hits, surface, places, light)) {
+    light.weight = {};
+    light.length = {};
+    return false;
+  }
+  takeOffShadowed(tracing, hits, places, coherent, light);
   return true;
 }
 

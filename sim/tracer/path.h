@@ -167,7 +167,12 @@ void addEmission(const Packet& packet, const Hits& hits, Lanes<float>& ambient);
 /// Next-event estimation: from every hit to every emitter.
 void gatherDirectLight(const Tracing& tracing, const Packet& packet, const Hits& hits, int surface, bool coherent,
                        LaneSums& sums);
-/// The light itself, of emitter `e`; false if there is none, and then `light` holds none.
+/// The light of emitter `e`, whatever is in its way; false if there is none, and then `light` holds nothing of use.
+bool lookForLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface,
+                    Vec3Lanes& places, DirectLight& light);
+/// Of what is `valid` in it, that which something hides becomes zero.
+void takeOffShadowed(const Tracing& tracing, const Hits& hits, const Vec3Lanes& places, bool coherent, DirectLight& light);
+/// Both; false if there is none, and then `light` holds none.
 bool findLightOf(const Tracing& tracing, std::size_t e, const Packet& packet, const Hits& hits, int surface,
                  bool coherent, Vec3Lanes& places, DirectLight& light);
 /// The same to emitter `e` alone; `places` are those on it.

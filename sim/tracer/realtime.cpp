@@ -24,7 +24,7 @@ constexpr int kSize = 4;  // of a block of pixels, both ways
 static_assert(kSize == CoarseGrid::kStep && kSize * kSize == embree::kLanes);
 
 /// Samples of indirect light for each coarse point: of a frame, and of the first one.
-constexpr int kSamples = 2, kFirstPasses = 8;
+constexpr int kSamples = 1, kFirstPasses = 12;
 /// A cut to another view needs them as well.
 constexpr double kMuchIsNew = 0.5;
 /// So many samples in the whole image look into the pixels where depth jumps, at most 16 in each.
@@ -101,12 +101,15 @@ void preparePixels(const Tracing& tracing, std::span<const Pixel> pixels, std::s
 
 struct RealtimeTracer::Impl {
   Light light;
-  Channels channels;
+  Channels channels;           ///< of the images
+  Channels indirect_channels;  ///< of light over several surfaces
+  std::vector<std::size_t> direct_of_indirect;  ///< by phasor of those: which it is of the images'
   IndirectLight indirect;
   std::vector<BlockGeometry> geometry;
   KeptDirect kept;
   std::uint32_t frame = 0;  ///< of those with light over several surfaces
 
+  void use(Channels of_indirect);
   void resize(const TraceRequest& request);
   template <class Work>
   void forBlocks(const CameraInfo& camera, const Work& work) const;
@@ -118,11 +121,20 @@ struct RealtimeTracer::Impl {
   void refineJumps(const Scene& scene, const TraceRequest& request, std::uint32_t turn);
   void recallBlocksOf(std::span<const Pixel> pixels, const Tracing& tracing);
   void storeMeans(const LaneSums& sums, std::size_t first_lane, unsigned samples, Pixel pixel);
-  void addIndirect(const Tracing& tracing);
+  void addIndirect(const Tracing& of_direct, const Tracing& tracing);
   void addSpread(const Part& at, const IndirectLight::Spread& spread);
   void storeWithSpread(const Part& at, const IndirectLight::Spread& spread, LaneSums& direct);
   void makeFrame(const Scene& scene, const TraceRequest& request);
 };
+
+void RealtimeTracer::Impl::use(Channels of_indirect) {
+  indirect_channels = std::move(of_indirect);
+  direct_of_indirect.clear();
+  for (const std::size_t term : indirect_channels.terms()) {
+    const auto at = std::ranges::lower_bound(channels.terms(), term);
+    direct_of_indirect.push_back(static_cast<std::size_t>(at - channels.terms().begin()));
+  }
+}
 
 void RealtimeTracer::Impl::resize(const TraceRequest& request) {
   const int w = request.camera.width, h = request.camera.height;
@@ -179,7 +191,12 @@ void RealtimeTracer::Impl::traceDirect(const Tracing& tracing, bool is_all) {
       keepGeometry(block, direct.truth, pixels);
       storeTruth(at, direct.truth);
       kept.mark(index, tracing.scene.is_matt && kept.isStill(pixels));
-      storeDirect(at, index, direct.sums);
+      kept.inImages(index) = KeptDirect::InImages::Nothing;
+      if (!tracing.scene.is_matt) {
+        storeDirect(at, index, direct.sums);
+      } else if (is_all) {
+        recall(at, index, direct);
+      }
     }
   });
 }
@@ -287,12 +304,12 @@ void RealtimeTracer::Impl::storeMeans(const LaneSums& sums, std::size_t first_la
   }
 }
 
-void RealtimeTracer::Impl::addIndirect(const Tracing& tracing) {
+void RealtimeTracer::Impl::addIndirect(const Tracing& of_direct, const Tracing& tracing) {
   const CameraInfo& camera = tracing.request.camera;
   forBlocks(camera, [&](int begin, int end, int columns) {
     Block block;
-    DirectTracer direct{tracing};
-    IndirectLight::Spread spread{channels, tracing.turns_per_metre.size()};
+    DirectTracer direct{of_direct};
+    IndirectLight::Spread spread{indirect_channels, tracing.turns_per_metre.size()};
     for (int i = begin; i != end; ++i) {
       const auto index = static_cast<std::size_t>(i);
       block.x = i % columns * kSize;
@@ -312,9 +329,10 @@ void RealtimeTracer::Impl::addSpread(const Part& at, const IndirectLight::Spread
   const LaneSums& sums = spread.sums;
   at.store(light.steady, [&](std::size_t i, float before) { return before + sums.steady[i]; });
   at.store(light.ambient, [&](std::size_t i, float before) { return before + sums.ambient[i]; });
-  for (std::size_t k = 0; k < channels.terms().size(); ++k) {
-    const Lanes<float>&re = sums.re[channels.lanes()[k]], &im = sums.im[channels.lanes()[k]];
-    at.store(light.phasors[channels.terms()[k]], [&](std::size_t i, std::complex<float> before) {
+  for (std::size_t k = 0; k < indirect_channels.terms().size(); ++k) {
+    const std::size_t lanes = indirect_channels.lanes()[k];
+    const Lanes<float>&re = sums.re[lanes], &im = sums.im[lanes];
+    at.store(light.phasors[indirect_channels.terms()[k]], [&](std::size_t i, std::complex<float> before) {
       return std::complex<float>{before.real() + re[i], before.imag() + im[i]};
     });
   }
@@ -330,9 +348,10 @@ void RealtimeTracer::Impl::storeWithSpread(const Part& at, const IndirectLight::
   };
   add(spread.sums.steady, direct.steady);
   add(spread.sums.ambient, direct.ambient);
-  for (const std::size_t lanes : channels.lanes()) {
-    add(spread.sums.re[lanes], direct.re[lanes]);
-    add(spread.sums.im[lanes], direct.im[lanes]);
+  for (std::size_t k = 0; k < direct_of_indirect.size(); ++k) {
+    const std::size_t from = indirect_channels.lanes()[k], to = channels.lanes()[direct_of_indirect[k]];
+    add(spread.sums.re[from], direct.re[to]);
+    add(spread.sums.im[from], direct.im[to]);
   }
   storeSums(at, direct);
   for (std::size_t f = 0; f < spread.variance.size(); ++f) at.copy(light.variance[f], spread.variance[f]);
@@ -347,13 +366,14 @@ void RealtimeTracer::Impl::makeFrame(const Scene& scene, const TraceRequest& req
   // Direct light alone is to stay the same where nothing moves.
   refineJumps(scene, request, request.max_surfaces == 1 ? 0 : frame++);
   if (request.max_surfaces == 1) return;
-  const Tracing tracing{scene.impl(), request, nullptr, channels.orders(), channels.lastOrders()};
-  indirect.gather(tracing, channels, kSamples);
+  const Tracing of_direct{scene.impl(), request, nullptr, channels.orders(), channels.lastOrders()};
+  const Tracing tracing{scene.impl(), request, nullptr, indirect_channels.orders(), indirect_channels.lastOrders()};
+  indirect.gather(tracing, indirect_channels, kSamples);
   if (indirect.shareOfNew() > kMuchIsNew) {
-    for (int pass = 1; pass < kFirstPasses; ++pass) indirect.gather(tracing, channels, kSamples);
+    for (int pass = 1; pass < kFirstPasses; ++pass) indirect.gather(tracing, indirect_channels, kSamples);
   }
   indirect.smooth();
-  addIndirect(tracing);
+  addIndirect(of_direct, tracing);
   kept.forgetImages();
 }
 
@@ -363,20 +383,21 @@ RealtimeTracer& RealtimeTracer::operator=(RealtimeTracer&&) noexcept = default;
 RealtimeTracer::~RealtimeTracer() = default;
 
 const Light& RealtimeTracer::next(const Scene& scene, const TraceRequest& request,
-                                  std::span<const std::uint8_t> wanted) {
+                                  std::span<const Harmonic> seen) {
   checkRequest(request);
   const auto require = [](bool is_met, const char* what) {
     if (!is_met) throw std::invalid_argument{fmt::format("trace: {}", what)};
   };
   require(request.region_width == 0, "in real time the region must be the whole image");
   require(request.gates.empty(), "gates need mode unbiased: their light cannot be kept from frame to frame");
-  require(wanted.empty() || wanted.size() == request.frequencies.size() * static_cast<std::size_t>(request.harmonics),
-          "wanted must name every frequency's harmonics");
-  Channels channels{request, wanted};
+  require(seen.empty() || seen.size() == request.frequencies.size() * static_cast<std::size_t>(request.harmonics),
+          "seen must name every frequency's harmonics");
+  Channels channels{request, seen};
   const Light& light = impl_->light;
   if (!(channels == impl_->channels) || request.frequencies != light.frequencies || request.harmonics != light.harmonics)
     impl_->kept.forgetImages();
   impl_->channels = std::move(channels);
+  impl_->use(Channels{request, seen, Harmonic::Seen});
   impl_->makeFrame(scene, request);
   return impl_->light;
 }

@@ -30,9 +30,10 @@ class RealtimeTracer {
   /// The next frame's light; it stays valid until the next call. Of the request, `samples_per_pixel` is
   /// not used, `max_surfaces` only counts as 1 (direct light alone), 2 or any number, gates are not
   /// possible, and the region must be the whole image; otherwise throws as trace() does. The seed should
-  /// stay the same. Phasors (in the order of Light::phasors) for which `wanted` is 0 are left out, their
-  /// images empty, except first harmonics.
-  const Light& next(const Scene& scene, const TraceRequest& request, std::span<const std::uint8_t> wanted = {});
+  /// stay the same. `seen` says of
+  /// each phasor, in the order of Light::phasors, how the camera sees it: those unseen are left out, their images empty, and of
+  /// those faint there is direct light alone; first harmonics are whole in any case, and without `seen` all are.
+  const Light& next(const Scene& scene, const TraceRequest& request, std::span<const Harmonic> seen = {});
 
  private:
   struct Impl;

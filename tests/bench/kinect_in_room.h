@@ -49,7 +49,7 @@ class Kinect {
     request = model.traceRequest();
     request.max_surfaces = 16;
     request.seed = seed;
-    wanted_ = model.correlatedTerms();
+    seen_ = model.correlatedTerms();
   }
   [[nodiscard]] Duration time() const { return static_cast<double>(frame) * kInterval; }
   [[nodiscard]] Moment moment() const {
@@ -58,7 +58,7 @@ class Kinect {
     moment.since_power_on = 10'800_s;
     return moment;
   }
-  const Light& trace() { return *(light = &tracer.next(scene.at(time()), request, wanted_)); }
+  const Light& trace() { return *(light = &tracer.next(scene.at(time()), request, seen_)); }
   [[nodiscard]] SensorModel::Exposed expose() const { return {{}, model.measure(*light, moment(), seed_, frame)}; }
   [[nodiscard]] Samples collect(const SensorModel& with) const {
     return with.collect(*light, moment(), seed_, frame);
@@ -77,7 +77,7 @@ class Kinect {
 
  private:
   std::uint64_t seed_;
-  std::vector<std::uint8_t> wanted_;
+  std::vector<Harmonic> seen_;
 };
 
 }  // namespace toftwin::bench

@@ -365,9 +365,9 @@ TEST(Realtime, LeavesOutHarmonicsThatNobodyWants) {
   request.frequencies = {80_MHz, 16_MHz};
   request.harmonics = 3;
   RealtimeTracer all, some;
-  const std::vector<std::uint8_t> wanted{0, 0, 0, 1, 0, 1};
+  const std::vector<Harmonic> seen{Harmonic::Unseen, Harmonic::Unseen, Harmonic::Unseen, Harmonic::Seen, Harmonic::Unseen, Harmonic::Seen};
   for (int frame = 0; frame < 2; ++frame) {
-    const Light &a = all.next(scene, request), &b = some.next(scene, request, wanted);
+    const Light &a = all.next(scene, request), &b = some.next(scene, request, seen);
     EXPECT_EQ(a.phasors[0], b.phasors[0]) << "the first harmonic always is";
     EXPECT_TRUE(b.phasors[1].empty() && b.phasors[2].empty() && b.phasors[4].empty());
     EXPECT_EQ(a.phasors[3], b.phasors[3]);
@@ -395,11 +395,11 @@ TEST(Realtime, ShowsSpecialSurfacesInDirectLight) {
 TEST(Realtime, RefusesWhatItCannotDo) {
   const Scene scene = sceneOf(room(0.2));
   const auto problemOf = [&](const std::function<void(TraceRequest&)>& change,
-                             const std::vector<std::uint8_t>& wanted = {}) {
+                             const std::vector<Harmonic>& seen = {}) {
     TraceRequest request = roomRequest();
     change(request);
     try {
-      RealtimeTracer{}.next(scene, request, wanted);
+      RealtimeTracer{}.next(scene, request, seen);
     } catch (const std::invalid_argument& problem) {
       return std::string{problem.what()};
     }
@@ -413,7 +413,7 @@ TEST(Realtime, RefusesWhatItCannotDo) {
               }),
               HasSubstr("gates need mode unbiased"));
   EXPECT_THAT(problemOf([](TraceRequest& r) { r.camera.fx = -1; }), HasSubstr("focal lengths"));
-  EXPECT_THAT(problemOf([](TraceRequest&) {}, {1, 1}), HasSubstr("wanted"));
+  EXPECT_THAT(problemOf([](TraceRequest&) {}, {Harmonic::Seen, Harmonic::Seen}), HasSubstr("seen"));
 }
 
 TEST(IrradianceCells, KeepNewSamplesLonger) {
