@@ -35,16 +35,18 @@ class KinectV2Decoder::Impl {
         // 80 MHz is three units of 240 MHz.
         unit_m_(settings.speed_of_light / (6.0 * shape.frequencies[0].in(hertz))),
         flags_(width, height),
-        brightness_(width, height),
+        brightness_(Image<float>::unset(width, height)),
         is_edge_(width, height) {
     for (std::size_t f = 0; f < kFrequencies; ++f) {
       counts_[f] = kinect_.counts_per_electron * kinect_.amplitude_multipliers[f];
     }
-    result_ = {.range_m = Image<float>{width_, height_},
+    result_ = {.range_m = Image<float>::unset(width_, height_),
                .amplitude = Image<float>{width_, height_},
-               .ambient = Image<float>{width_, height_},
-               .flags = Image<std::uint8_t>{width_, height_},
-               .phasors = std::vector(kFrequencies, Image<std::complex<float>>{width_, height_})};
+               .ambient = Image<float>::unset(width_, height_),
+               .flags = Image<std::uint8_t>::unset(width_, height_),
+               .phasors = {}};
+    for (std::size_t f = 0; f < kFrequencies; ++f)
+      result_.phasors.push_back(Image<std::complex<float>>::unset(width_, height_));
     limits_ = limits();
   }
 
@@ -160,7 +162,7 @@ class KinectV2Decoder::Impl {
   }
 
   void dropEdges() {
-    Image<float> depth_m{width_, height_};
+    auto depth_m = Image<float>::unset(width_, height_);
     forRows(height_, [&](int first, int last) {
       for (int y = first; y < last; ++y) {
         for (int x = 0; x < width_; ++x)

@@ -114,7 +114,7 @@ Image<float> CoarseHalo::cellsOf(const float* image, int height) const {
     for (int part = 0; part < parts_; ++part)
       weights[static_cast<std::size_t>(i * parts_ + part)] = knots.weight[static_cast<std::size_t>(cell - knots.first)];
   }
-  Image<float> cells{across * parts_, cellsAlong(height)};
+  auto cells = Image<float>::unset(across * parts_, cellsAlong(height));
   inFewParts(cells.height(), 4, [&](int first, int last) {
     std::vector<float> padded(static_cast<std::size_t>((kCell * across + kReach) * parts_));
     float* sum = padded.data() + kBefore * parts_;
@@ -161,7 +161,7 @@ Image<float> CoarseHalo::blurred(const Image<float>& cells, double sigma_cells) 
 }
 
 Image<float> CoarseHalo::widened(const Image<float>& cells) const {
-  Image<float> wide{width_ * parts_, cells.height()};
+  auto wide = Image<float>::unset(width_ * parts_, cells.height());
   const int groups = (width_ + kCell - 1) / kCell, count = groups * parts_;
   inFewParts(cells.height(), 4, [&](int first, int last) {
     // Every fourth column sees its cells in the same way.

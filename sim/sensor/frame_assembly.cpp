@@ -30,7 +30,7 @@ Plane planar(PlaneKind kind, int width, int height, int channels, std::vector<fl
 }
 
 Image<float> depthOf(const Image<float>& range_m, const Image<float>& ray_z, int left, int top) {
-  Image<float> depth_m{range_m.width(), range_m.height()};
+  auto depth_m = Image<float>::unset(range_m.width(), range_m.height());
   for (int y = 0; y < range_m.height(); ++y) {
     for (int x = 0; x < range_m.width(); ++x)
       depth_m(x, y) = range_m(x, y) * ray_z(left + x, top + y);

@@ -269,15 +269,18 @@ void RealtimeTracer::Impl::recallBlocksOf(std::span<const Pixel> pixels, const T
   for (const auto& [x, y] : pixels) blocks.push_back(y / kSize * columns + x / kSize);
   std::ranges::sort(blocks);
   blocks.erase(std::ranges::unique(blocks).begin(), blocks.end());
-  DirectTracer direct{tracing};
-  Block block;
-  for (const int i : blocks) {
-    block.x = i % columns * kSize;
-    block.y = i / columns * kSize;
-    const auto index = static_cast<std::size_t>(i);
-    if (kept.inImages(index) == KeptDirect::InImages::Nothing) recall({block, camera}, index, direct);
-    kept.inImages(index) = KeptDirect::InImages::Refined;
-  }
+  inParallel(static_cast<int>(blocks.size()), 64, [&](int first, int last) {
+    const FlushDenormals flush;
+    DirectTracer direct{tracing};
+    Block block;
+    for (const int i : std::span{blocks}.subspan(static_cast<std::size_t>(first), static_cast<std::size_t>(last - first))) {
+      block.x = i % columns * kSize;
+      block.y = i / columns * kSize;
+      const auto index = static_cast<std::size_t>(i);
+      if (kept.inImages(index) == KeptDirect::InImages::Nothing) recall({block, camera}, index, direct);
+      kept.inImages(index) = KeptDirect::InImages::Refined;
+    }
+  });
 }
 
 void RealtimeTracer::Impl::storeMeans(const LaneSums& sums, std::size_t first_lane, unsigned samples, Pixel pixel) {

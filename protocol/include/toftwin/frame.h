@@ -26,9 +26,9 @@ class Buffer {
       : owner_(std::move(owner)), bytes_(bytes) {}
 
   /// Takes the elements over without copying them.
-  template <class T>
-  static Buffer adopt(std::vector<T> elements) {
-    auto owner = std::make_shared<const std::vector<T>>(std::move(elements));
+  template <class T, class Allocator>
+  static Buffer adopt(std::vector<T, Allocator> elements) {
+    auto owner = std::make_shared<const std::vector<T, Allocator>>(std::move(elements));
     return {owner, std::as_bytes(std::span{*owner})};
   }
   [[nodiscard]] std::span<const std::byte> bytes() const { return bytes_; }

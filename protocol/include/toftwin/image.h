@@ -3,10 +3,31 @@
 
 #include <cassert>
 #include <cstddef>
+#include <memory>
 #include <span>
+#include <type_traits>
+#include <utility>
 #include <vector>
 
 namespace toftwin {
+
+/// Numbers of a vector that is made of a size alone are whatever lies in its memory.
+template <class T>
+struct UnsetNumbers : std::allocator<T> {
+  template <class U>
+  struct rebind {
+    using other = UnsetNumbers<U>;
+  };
+  using std::allocator<T>::allocator;
+  template <class U>
+  void construct(U*) {
+    static_assert(std::is_trivially_copyable_v<U> && std::is_trivially_destructible_v<U>);
+  }
+  template <class U, class First, class... More>
+  void construct(U* at, First&& first, More&&... more) {
+    std::construct_at(at, std::forward<First>(first), std::forward<More>(more)...);
+  }
+};
 
 /// A dense image, row by row from the top left. Its unit is in the variable's name (`range_m`).
 template <class T>
@@ -17,6 +38,14 @@ class Image {
       : width_(width),
         height_(height),
         data_(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), fill) {}
+  /// One whose pixels are all to be written before they are read: it saves the time for filling them.
+  static Image unset(int width, int height) {
+    Image image;
+    image.width_ = width;
+    image.height_ = height;
+    image.data_ = Numbers(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+    return image;
+  }
 
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
@@ -31,8 +60,9 @@ class Image {
 
   std::span<T> pixels() { return data_; }
   [[nodiscard]] std::span<const T> pixels() const { return data_; }
+  using Numbers = std::vector<T, UnsetNumbers<T>>;
   /// Gives the pixels away and leaves an empty image.
-  std::vector<T> release() {
+  Numbers release() {
     width_ = height_ = 0;
     return std::move(data_);
   }
@@ -45,7 +75,7 @@ class Image {
   }
   int width_ = 0;
   int height_ = 0;
-  std::vector<T> data_;
+  Numbers data_;
 };
 
 }  // namespace toftwin
