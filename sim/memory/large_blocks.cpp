@@ -10,9 +10,9 @@ constexpr std::size_t kChunks = 1024;  // addresses alone: memory comes where it
 constexpr std::size_t kRange = kChunks * LargeBlocks::kChunk;
 constexpr std::size_t kUnits = LargeBlocks::kChunk / LargeBlocks::kUnit;
 
-/// The first of so many free units in a row; 0, which is the chunk's own, if there are none.
-std::size_t firstFree(const std::uint16_t* length, std::size_t units) {
-  for (std::size_t at = 1, from = 1; at < kUnits;) {
+/// The first of so many free units in a row from `first` on; 0 if there are none.
+std::size_t firstFree(const std::uint16_t* length, std::size_t first, std::size_t units) {
+  for (std::size_t at = first, from = first; at < kUnits;) {
     if (length[at] != 0) {
       from = at += length[at];
     } else if (++at - from == units) {
@@ -50,13 +50,14 @@ bool LargeBlocks::reserve() {
 
 void* LargeBlocks::take(std::size_t bytes) {
   if (bytes < kLeast || bytes > kMost) return nullptr;
+  constexpr std::size_t kOwn = (sizeof(Chunk) + kUnit - 1) / kUnit;  // a chunk's first units hold its table
   const std::size_t units = (bytes + kUnit - 1) / kUnit;
   const std::scoped_lock lock{mutex_};
   if (!reserve()) return nullptr;
   for (std::size_t number = 0; number < kChunks; ++number) {
     Chunk& at = chunk(number);
-    if (at.used + units >= kUnits) continue;
-    const std::size_t unit = firstFree(at.length, units);
+    if (at.used + units > kUnits - kOwn) continue;
+    const std::size_t unit = firstFree(at.length, kOwn, units);
     if (unit == 0) continue;
     at.length[unit] = static_cast<std::uint16_t>(units);
     at.used += static_cast<std::uint32_t>(units);
@@ -87,6 +88,13 @@ void LargeBlocks::give(void* block) {
   } else {
     ::madvise(&at, kChunk, MADV_DONTNEED);  // all zero then, as an empty chunk is
   }
+}
+
+std::size_t LargeBlocks::bytesInUse() const {
+  const std::scoped_lock lock{mutex_};
+  std::size_t units = 0;
+  for (std::size_t number = 0; number < opened_; ++number) units += chunk(number).used;
+  return units * kUnit;
 }
 
 std::size_t LargeBlocks::chunksHeld() const {

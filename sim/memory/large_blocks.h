@@ -20,7 +20,7 @@ namespace toftwin::sim {
 class LargeBlocks {
  public:
   static constexpr std::size_t kPage = std::size_t{2} << 20;    ///< bytes, of the large ones
-  static constexpr std::size_t kUnit = std::size_t{16} << 10;   ///< of which blocks are multiples
+  static constexpr std::size_t kUnit = std::size_t{4} << 10;    ///< of which blocks are multiples
   static constexpr std::size_t kChunk = std::size_t{32} << 20;
   static constexpr std::size_t kLeast = std::size_t{32} << 10, kMost = kChunk / 2;  ///< of a block
 
@@ -35,6 +35,8 @@ class LargeBlocks {
   /// Whether take() gave it.
   [[nodiscard]] bool has(const void* block) const;
   void give(void* block);
+  /// In blocks that were taken and not given back.
+  [[nodiscard]] std::size_t bytesInUse() const;
   /// Chunks whose memory is not the kernel's.
   [[nodiscard]] std::size_t chunksHeld() const;
 
@@ -44,7 +46,6 @@ class LargeBlocks {
     std::uint32_t used;  ///< units
     std::uint16_t length[kChunk / kUnit];  ///< by unit: of the block that begins there, or 0
   };
-  static_assert(sizeof(Chunk) <= kUnit);
 
   bool reserve();
   [[nodiscard]] Chunk& chunk(std::size_t number) const;
@@ -55,6 +56,9 @@ class LargeBlocks {
   std::optional<std::size_t> spare_;         ///< the one that has none, and whose memory is kept
   bool is_refused_ = false;
 };
+
+/// What operator new has taken of them, in a program that is linked with ours (operator_new.cpp).
+std::size_t largeBytesInUse();
 
 /// Asks for large pages for what lies in so many bytes from a multiple of LargeBlocks::kPage on.
 void wantLargePages(void* memory, std::size_t bytes);

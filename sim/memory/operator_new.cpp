@@ -51,6 +51,8 @@ void release(void* block) noexcept {
 
 }  // namespace
 
+std::size_t toftwin::sim::largeBytesInUse() { return largeBlocks().bytesInUse(); }
+
 // Those for arrays, and those that do not throw, call these.
 void* operator new(std::size_t bytes) { return allocate(bytes, __STDCPP_DEFAULT_NEW_ALIGNMENT__); }
 void* operator new(std::size_t bytes, std::align_val_t alignment) {
@@ -60,5 +62,9 @@ void operator delete(void* block) noexcept { release(block); }
 void operator delete(void* block, std::size_t) noexcept { release(block); }
 void operator delete(void* block, std::align_val_t) noexcept { release(block); }
 void operator delete(void* block, std::size_t, std::align_val_t) noexcept { release(block); }
+
+#else
+
+std::size_t toftwin::sim::largeBytesInUse() { return 0; }
 
 #endif

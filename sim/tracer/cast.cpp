@@ -3,6 +3,8 @@
 
 #include <limits>
 
+#include "sim/tracer/pairs.h"
+
 namespace toftwin::sim {
 namespace {
 
@@ -76,16 +78,27 @@ bool takeInto(const Frame& frame, const int* valid, const RTCRay16& rays, int* c
   return true;
 }
 
+/// Of still objects.
+void takeQuadranglesApart(const Scene::Impl& scene, RTCHit16& hits) {
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    if (hits.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
+    takeApart(scene.rows[hits.geomID[i]].is_paired, hits.primID[i], hits.u[i], hits.v[i]);
+  }
+}
+
 /// What was met in the object's frame is nearer than what was met before: Embree saw `tfar`.
 TOFTWIN_VECTOR
-void takeBack(const RTCRayHit16& local, const int* can_meet, RTCRayHit16& rays) {
+void takeBack(const RTCRayHit16& local, const int* can_meet, bool is_paired, RTCRayHit16& rays) {
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const bool is_met = (can_meet[i] != 0) & (local.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID);
+    unsigned primitive = local.hit.primID[i];
+    float u = local.hit.u[i], v = local.hit.v[i];
+    takeApart(is_paired, primitive, u, v);
     rays.ray.tfar[i] = is_met ? local.ray.tfar[i] : rays.ray.tfar[i];
-    rays.hit.u[i] = is_met ? local.hit.u[i] : rays.hit.u[i];
-    rays.hit.v[i] = is_met ? local.hit.v[i] : rays.hit.v[i];
+    rays.hit.u[i] = is_met ? u : rays.hit.u[i];
+    rays.hit.v[i] = is_met ? v : rays.hit.v[i];
     rays.hit.geomID[i] = is_met ? local.hit.geomID[i] : rays.hit.geomID[i];
-    rays.hit.primID[i] = is_met ? local.hit.primID[i] : rays.hit.primID[i];
+    rays.hit.primID[i] = is_met ? primitive : rays.hit.primID[i];
   }
 }
 
@@ -113,6 +126,7 @@ TOFTWIN_INLINE void castAtMovers(const Scene::Impl& scene, const int* valid, RTC
 TOFTWIN_VECTOR
 void castRays(const Scene::Impl& scene, const int* valid, RTCRayHit16& rays, bool coherent) {
   embree::intersect(valid, scene.still, rays, coherent);
+  if (scene.still_has_pairs) takeQuadranglesApart(scene, rays.hit);
   for (const Standing& standing : scene.poses) {
     Lanes<int> can_meet;
     RTCRayHit16 local;
@@ -120,7 +134,7 @@ void castRays(const Scene::Impl& scene, const int* valid, RTCRayHit16& rays, boo
     for (std::size_t i = 0; i < kLaneCount; ++i)
       local.hit.geomID[i] = local.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
     embree::intersect(can_meet.v, standing.embree, local, coherent);
-    takeBack(local, can_meet.v, rays);
+    takeBack(local, can_meet.v, standing.is_paired, rays);
   }
 }
 

@@ -6,6 +6,7 @@
 
 #include "sim/images/rows.h"
 #include "sim/tracer/indirect_tile.h"
+#include "sim/tracer/kept_direct.h"
 #include "sim/tracer/lit_points.h"
 
 namespace toftwin::sim {
@@ -69,15 +70,24 @@ void store(const CoarseTile& tile, const Channels& channels, int i, int j, int s
 
 /// Takes every coarse point's samples; what they found for the cells comes back tile by tile.
 void gatherTiles(const Tracing& tracing, const IrradianceCells& cells, const LitPoints& lights, const Channels& channels,
-                 std::uint32_t first_sample, int samples, CoarseGrid& grid, std::vector<CellUpdate>& updates) {
+                 const KeptDirect& kept, std::uint32_t first_sample, int samples, CoarseGrid& grid,
+                 std::vector<SeenTile>& seen, std::vector<CellUpdate>& updates) {
   const int columns = (grid.width + 3) / 4, rows = (grid.height + 3) / 4;
   updates.resize(static_cast<std::size_t>(columns * rows));
+  seen.resize(updates.size());
   inParallel(columns * rows, 8, [&](int begin, int end) {
     const FlushDenormals flush;
     TileGatherer gatherer{tracing, cells, lights, channels};
     for (int t = begin; t != end; ++t) {
       const int i = t % columns * 4, j = t / columns * 4;
-      gatherer.gather(i, j, first_sample, samples, updates[static_cast<std::size_t>(t)]);
+      const auto number = static_cast<std::size_t>(t);
+      SeenTile& tile = seen[number];
+      // The last points lie in the last blocks.
+      if (tile.frame == 0 || tile.frame < kept.newest(std::min(i, kept.columns() - 1), std::min(j, kept.rows() - 1), i + 3, j + 3)) {
+        gatherer.look(i, j, tile);
+        tile.frame = kept.frame();
+      }
+      gatherer.gather(i, j, tile, first_sample, samples, updates[number]);
       store(gatherer.tile(), channels, i, j, samples, grid);
     }
   });
@@ -175,7 +185,7 @@ IndirectLight::IndirectLight(IndirectLight&&) noexcept = default;
 IndirectLight& IndirectLight::operator=(IndirectLight&&) noexcept = default;
 IndirectLight::~IndirectLight() = default;
 
-void IndirectLight::gather(const Tracing& tracing, const Channels& channels, int samples) {
+void IndirectLight::gather(const Tracing& tracing, const Channels& channels, const KeptDirect& kept, int samples) {
   const TraceRequest& request = tracing.request;
   const int width = coarse(request.camera.width), height = coarse(request.camera.height);
   if (!cells_ || tracing.scene.id != scene_id_ || !(channels == channels_) || width != grid_.width ||
@@ -196,9 +206,10 @@ void IndirectLight::gather(const Tracing& tracing, const Channels& channels, int
   } else {
     lights_->clear();
   }
-  gatherTiles(tracing, *cells_, *lights_, channels_, samples_done_, samples, grid_, updates_);
+  gatherTiles(tracing, *cells_, *lights_, channels_, kept, samples_done_, samples, grid_, seen_, updates_);
   update(updates_, memory.cells, channels_.count(), *cells_);
   samples_done_ += static_cast<std::uint32_t>(samples);
+  weights_.resize(static_cast<std::size_t>(kept.columns()) * static_cast<std::size_t>(kept.rows()));
   Places now{tracing};
   takeHistory(before_, tracing, now, memory);
   places_ = std::move(now);

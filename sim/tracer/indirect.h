@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -71,10 +72,14 @@ void addTurned(const Tracing& tracing, const Channels& channels, const Lanes<flo
 /// What the full image's pixels of one 4 × 4 block are, for spreading coarse light onto them.
 struct BlockGeometry {
   Lanes<float> x, y, z, normal_x, normal_y, normal_z;  ///< camera's frame; zero where nothing
-  Lanes<float> albedo;
-  Lanes<double> range_m;
 };
 
+/// What else counts of them; zero where nothing.
+struct BlockTruth {
+  Lanes<float> range_m, albedo;
+};
+
+class KeptDirect;
 class LitPoints;
 
 /// Where the camera and all that moves is.
@@ -91,6 +96,20 @@ struct CellUpdate {
   std::vector<Lanes<float>> values;    ///< by channel
 };
 
+/// What a tile's central rays met, as long as it stays where it is.
+struct SeenTile {
+  std::uint32_t frame = 0;  ///< in which they were traced; 0: never
+  Lanes<int> valid, mover;
+  Vec3Lanes position, normal;
+  Vec3fLanes start;
+};
+
+/// What the four coarse points around a block count for each of its pixels, times the pixel's albedo; likewise.
+struct CornerWeights {
+  std::uint32_t frame = 0;
+  std::array<Lanes<float>, 4> of;
+};
+
 /// Light that reaches surfaces over other surfaces, kept over frames. Means are of incoming radiance,
 /// weighted with the cosine and without the way to the camera: neither albedo nor place of the camera
 /// is in them, so they are as smooth as the light is.
@@ -101,8 +120,8 @@ class IndirectLight {
   IndirectLight& operator=(IndirectLight&&) noexcept;
   ~IndirectLight();
 
-  /// Takes `samples` more for each coarse point.
-  void gather(const Tracing& tracing, const Channels& channels, int samples);
+  /// Takes `samples` more for each coarse point. `kept` says which surfaces are where they were.
+  void gather(const Tracing& tracing, const Channels& channels, const KeptDirect& kept, int samples);
   /// Share of coarse points on a surface that had nothing to go on from earlier calls.
   [[nodiscard]] double shareOfNew() const { return share_of_new_; }
   /// Smoothes along surfaces; before spread().
@@ -115,8 +134,9 @@ class IndirectLight {
     std::vector<Lanes<float>> variance;  ///< by frequency
     std::vector<Lanes<float>> light;
   };
-  /// The light that the pixels of the block at (left, top) send to the camera.
-  void spread(const Tracing& tracing, int left, int top, const BlockGeometry& pixels, Spread& out) const;
+  /// The light that the pixels of the block at (left, top) send to the camera. By several threads for several blocks.
+  void spread(const Tracing& tracing, int left, int top, const BlockGeometry& pixels, const BlockTruth& truth,
+              const KeptDirect& kept, Spread& out);
 
  private:
   /// How many samples count in means at most.
@@ -135,6 +155,8 @@ class IndirectLight {
   std::unique_ptr<IrradianceCells> cells_;
   std::unique_ptr<LitPoints> lights_;
   std::vector<CellUpdate> updates_;  ///< of this frame, in memory of the last
+  std::vector<SeenTile> seen_;              ///< by tile
+  std::vector<CornerWeights> weights_;      ///< by block of pixels
   std::uint32_t samples_done_ = 0;
   double share_of_new_ = 1.0;
 };

@@ -9,6 +9,7 @@
 
 #include "sim/images/rows.h"
 #include "sim/tracer/indirect.h"
+#include "sim/tracer/kept_direct.h"
 
 namespace toftwin::sim {
 namespace {
@@ -177,16 +178,10 @@ class RowSmoother {
   std::vector<float> per_total_, weights_;
 };
 
-/// A coarse point next to a block, as its pixels see it.
-struct Corner {
-  std::size_t point;  ///< its index in the grid's images
-  Lanes<float> weight;
-};
-
+/// What a point of the grid next to a block counts for the block's pixels.
 TOFTWIN_VECTOR
-void weighCorner(const CoarseGrid& grid, const BlockGeometry& pixels, int right, int below, Corner& corner,
-                 Lanes<float>& total) {
-  const std::size_t at = corner.point;
+void weighCorner(const CoarseGrid& grid, std::size_t at, const BlockGeometry& pixels, int right, int below,
+                 Lanes<float>& of, Lanes<float>& total) {
   const Facet q{grid.x[at],        grid.y[at],        grid.z[at],
                 grid.normal_x[at], grid.normal_y[at], grid.normal_z[at]};
   const float known = grid.samples[at] > 0.0f ? 1.0f : 0.0f;
@@ -201,20 +196,33 @@ void weighCorner(const CoarseGrid& grid, const BlockGeometry& pixels, int right,
     // Next to things that no coarse point lies on, others are better than none.
     weight[i] = known * (linear + 0.01f) * (alike(p, q, rangeSquared(p)).squared() + 1e-4f);
   }
-  corner.weight = weight;
+  of = weight;
   for (std::size_t i = 0; i < kLaneCount; ++i) total[i] += weight[i];
 }
 
+/// The points around a block, by their places in the grid's images.
+using Corners = std::array<std::size_t, 4>;
+
+void weighCorners(const CoarseGrid& grid, const Corners& corners, const BlockGeometry& pixels,
+                  const Lanes<float>& albedo, CornerWeights& weights) {
+  Lanes<float> total;
+  for (std::size_t i = 0; i < kLaneCount; ++i) total[i] = 1e-20f;
+  for (std::size_t corner = 0; corner < corners.size(); ++corner) {
+    weighCorner(grid, corners[corner], pixels, static_cast<int>(corner & 1), static_cast<int>(corner >> 1),
+                weights.of[corner], total);
+  }
+  for (std::size_t i = 0; i < kLaneCount; ++i) total[i] = albedo[i] / total[i];
+  for (Lanes<float>& of : weights.of) {
+    for (std::size_t i = 0; i < kLaneCount; ++i) of[i] *= total[i];
+  }
+}
+
 TOFTWIN_VECTOR
-void mix(const std::array<Corner, 4>& corners, const Image<float>& values, const Lanes<float>& scale,
-         Lanes<float>& out) {
-  const float a = values[corners[0].point], b = values[corners[1].point];
-  const float c = values[corners[2].point], d = values[corners[3].point];
-  const Lanes<float>&wa = corners[0].weight, &wb = corners[1].weight;
-  const Lanes<float>&wc = corners[2].weight, &wd = corners[3].weight;
+void mix(const Corners& corners, const CornerWeights& weights, const Image<float>& values, Lanes<float>& out) {
+  const float a = values[corners[0]], b = values[corners[1]], c = values[corners[2]], d = values[corners[3]];
+  const auto& [wa, wb, wc, wd] = weights.of;
   Lanes<float> mixed;
-  for (std::size_t i = 0; i < kLaneCount; ++i)
-    mixed[i] = (wa[i] * a + wb[i] * b + wc[i] * c + wd[i] * d) * scale[i];
+  for (std::size_t i = 0; i < kLaneCount; ++i) mixed[i] = wa[i] * a + wb[i] * b + wc[i] * c + wd[i] * d;
   out = mixed;
 }
 
@@ -244,30 +252,32 @@ IndirectLight::Spread::Spread(const Channels& channels, std::size_t frequencies)
       light(channels.count()) {}
 
 void IndirectLight::spread(const Tracing& tracing, int left, int top, const BlockGeometry& pixels,
-                           Spread& out) const {
+                           const BlockTruth& truth, const KeptDirect& kept, Spread& out) {
   const int u = left / CoarseGrid::kStep, v = top / CoarseGrid::kStep;
   const int right = std::min(u + 1, smooth_.width - 1), below = std::min(v + 1, smooth_.height - 1);
-  std::array<Corner, 4> corners;
-  Lanes<float> total, scale, scale2, one;
+  const auto pointAt = [&](int column, int row) {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(smooth_.width) + static_cast<std::size_t>(column);
+  };
+  const Corners corners{pointAt(u, v), pointAt(right, v), pointAt(u, below), pointAt(right, below)};
+  CornerWeights& weights = weights_[static_cast<std::size_t>(v) * static_cast<std::size_t>(kept.columns()) +
+                                    static_cast<std::size_t>(u)];
+  if (weights.frame == 0 || weights.frame < kept.newest(u, v, u + 1, v + 1)) {
+    weighCorners(smooth_, corners, pixels, truth.albedo, weights);
+    weights.frame = kept.frame();
+  }
+  Lanes<float> one;
+  Lanes<double> range_m;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    total[i] = 1e-20f;
     one[i] = 1.0f;
+    range_m[i] = static_cast<double>(truth.range_m[i]);
   }
-  for (int corner = 0; corner < 4; ++corner) {
-    const int is_right = corner & 1, is_below = corner >> 1;
-    Corner& at = corners[static_cast<std::size_t>(corner)];
-    at.point = static_cast<std::size_t>(is_below != 0 ? below : v) * static_cast<std::size_t>(smooth_.width) +
-               static_cast<std::size_t>(is_right != 0 ? right : u);
-    weighCorner(smooth_, pixels, is_right, is_below, at, total);
-  }
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    scale[i] = pixels.albedo[i] / total[i];
-    scale2[i] = pixels.albedo[i] * scale[i];
-  }
-  for (std::size_t c = 0; c < out.light.size(); ++c) mix(corners, smooth_.means[c], scale, out.light[c]);
+  for (std::size_t c = 0; c < out.light.size(); ++c) mix(corners, weights, smooth_.means[c], out.light[c]);
   clearSums(out.sums);
-  addTurned(tracing, channels_, one, pixels.range_m, out.light, out.sums);
-  for (std::size_t f = 0; f < out.variance.size(); ++f) mix(corners, smooth_.squares[f], scale2, out.variance[f]);
+  addTurned(tracing, channels_, one, range_m, out.light, out.sums);
+  for (std::size_t f = 0; f < out.variance.size(); ++f) {
+    mix(corners, weights, smooth_.squares[f], out.variance[f]);
+    for (std::size_t i = 0; i < kLaneCount; ++i) out.variance[f][i] *= truth.albedo[i];
+  }
 }
 
 }  // namespace toftwin::sim

@@ -33,10 +33,12 @@ std::uint32_t numberInSequence(std::uint32_t sample, std::size_t lane) {
   return (sample / kInARow * static_cast<std::uint32_t>(kLaneCount) + point) * kInARow + sample % kInARow;
 }
 
+PixelKey keyOfTile(const Tracing& tracing, int i, int j) {
+  return pixelKey(tracing.seed, static_cast<std::uint32_t>(i * CoarseGrid::kStep), static_cast<std::uint32_t>(j * CoarseGrid::kStep));
+}
+
 void prepareTile(const Tracing& tracing, int i, int j, Block& block) {
   const CameraInfo& camera = tracing.request.camera;
-  const PixelKey key = pixelKey(tracing.seed, static_cast<std::uint32_t>(i * CoarseGrid::kStep),
-                                static_cast<std::uint32_t>(j * CoarseGrid::kStep));
   block.shape = BlockShape::forSamples(1);
   Lanes<int> columns, rows;
   for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
@@ -45,10 +47,28 @@ void prepareTile(const Tracing& tracing, int i, int j, Block& block) {
     rows[lane] = std::min((j + l / 4) * CoarseGrid::kStep, camera.height - 1);
     block.is_inside[lane] = -1;
     block.first_sample[lane] = 0;
-    block.key_a[lane] = key.a;
-    block.key_b[lane] = key.b;
+    block.key_a[lane] = block.key_b[lane] = 0;  // middles need no random numbers
   }
   tracing.lens.raysOf(columns, rows, block.rays);
+}
+
+/// Paths that are at the points of a tile, and the hits that they are at. Where they came from does not count: light is counted
+/// as if surfaces were matt there.
+void startAt(const SeenTile& seen, PixelKey key, bool is_even, Packet& packet, Hits& hits) {
+  hits.position = seen.position;
+  hits.normal = packet.direction = seen.normal;
+  hits.start = seen.start;
+  packet.valid = seen.valid;
+  packet.is_even = is_even;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    packet.key_a[i] = key.a;
+    packet.key_b[i] = key.b;
+    packet.throughput[i] = 1.0f;
+    packet.length[i] = 0.0;
+    hits.distance[i] = 0.0;
+    hits.albedo[i] = hits.shape_a[i] = 1.0f;
+    hits.shape_b[i] = 0.0f;
+  }
 }
 
 /// Light now is counted from these hits on: as if they were white and matt, and the way to them nothing.
@@ -119,37 +139,61 @@ TileGatherer::TileGatherer(const Tracing& tracing, const IrradianceCells& cells,
   tile_.squares.resize(tracing.turns_per_metre.size());
 }
 
-void TileGatherer::gather(int i, int j, std::uint32_t first_sample, int samples, CellUpdate& update) {
+void TileGatherer::look(int i, int j, SeenTile& seen) {
+  Block block;
   Packet camera_rays;
-  lookFromCamera(i, j, camera_rays);
+  prepareTile(tracing_, i, j, block);
+  preparePacket(tracing_, block, camera_rays);
+  startInTheMiddle(tracing_, block, camera_rays);
+  RTCRayHit16 rays;
+  intersect(tracing_, camera_rays, rays, true);
+  Lanes<float> unused{};
+  endMissed(0.0f, rays, camera_rays, unused);
+  findHits(tracing_.scene, camera_rays, rays, hits_);
+  seen.valid = camera_rays.valid;
+  seen.position = hits_.position;
+  seen.normal = hits_.normal;
+  seen.start = hits_.start;
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
+    const bool is_hit = camera_rays.valid[lane] != 0;
+    const Standing* mover = is_hit ? tracing_.scene.rows[rays.hit.geomID[lane]].standing : nullptr;
+    seen.mover[lane] = mover != nullptr ? static_cast<int>(mover - tracing_.scene.poses.data()) + 1 : 0;
+  }
+}
+
+void TileGatherer::gather(int i, int j, const SeenTile& tile, std::uint32_t first_sample, int samples, CellUpdate& update) {
+  keepGeometry(tile);
   std::fill(tile_.sums.begin(), tile_.sums.end(), Lanes<double>{});
   std::fill(tile_.squares.begin(), tile_.squares.end(), Lanes<double>{});
   std::fill(tile_.lit.begin(), tile_.lit.end(), Lanes<float>{});
   update.keys = {};
   update.values.resize(channels_.count());
-  if (!isAny(camera_rays.valid)) return;
-  const Hits seen = hits_;
+  if (!isAny(tile.valid)) return;
+  Packet start;
+  Hits seen;
+  startAt(tile, keyOfTile(tracing_, i, j), tracing_.request.sampler != Sampler::Plain, start, seen);
+  hits_ = seen;
   normals_ = seen.normal;
   samples_ = samples;
-  lookAtLights(camera_rays);
+  lookAtLights(tile.valid);
   for (int s = 0; s < samples; ++s) {
     const std::uint32_t sample = first_sample + static_cast<std::uint32_t>(s);
-    Packet packet = camera_rays;
+    Packet packet = start;
     for (std::size_t lane = 0; lane < kLaneCount; ++lane) packet.index[lane] = numberInSequence(sample, lane);
     hits_ = seen;
     clearSums(sums_);
     for (std::uint32_t ray = 0; lights_.areAny() && ray < kRaysToLit; ++ray)
       takeOffBlocked(packet, sample * kRaysToLit + ray, seen);
     follow(packet, s == 0 ? &update : nullptr);
-    keepSums(camera_rays.valid);
+    keepSums(tile.valid);
   }
 }
 
 /// The light that falls from lit points onto the coarse points.
-void TileGatherer::lookAtLights(const Packet& camera_rays) {
+void TileGatherer::lookAtLights(const Lanes<int>& valid) {
   clearSums(fallen_);
   if (!lights_.areAny()) return;
-  lights_.weigh({inSingle(hits_.position), inSingle(normals_), camera_rays.valid}, samples_, shares_);
+  lights_.weigh({inSingle(hits_.position), inSingle(normals_), valid}, samples_, shares_);
   lights_.add(tracing_, channels_, shares_, fallen_);
   forEachChannel(fallen_, [&](std::size_t channel, const Lanes<float>& lanes) { tile_.lit[channel] = lanes; });
 }
@@ -175,29 +219,9 @@ void TileGatherer::takeOffBlocked(const Packet& packet, std::uint32_t number, co
   if (isAny(is_blocked)) lights_.takeOff(tracing_, channels_, shares_, picked, is_blocked, 1.0f / kRaysToLit, found_, sums_);
 }
 
-/// Finds the coarse points themselves.
-void TileGatherer::lookFromCamera(int i, int j, Packet& camera_rays) {
-  Block block;
-  prepareTile(tracing_, i, j, block);
-  preparePacket(tracing_, block, camera_rays);
-  startInTheMiddle(tracing_, block, camera_rays);
-  RTCRayHit16 rays;
-  intersect(tracing_, camera_rays, rays, true);
-  Lanes<float> unused{};
-  endMissed(0.0f, rays, camera_rays, unused);
-  findHits(tracing_.scene, camera_rays, rays, hits_);
-  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
-    const bool is_hit = camera_rays.valid[lane] != 0;
-    const Standing* mover = is_hit ? tracing_.scene.rows[rays.hit.geomID[lane]].standing : nullptr;
-    tile_.mover[lane] = mover != nullptr ? static_cast<int>(mover - tracing_.scene.poses.data()) + 1 : 0;
-  }
-  keepGeometry(camera_rays);
-}
-
 /// One sample of the light that falls onto the hits: from the surface there lit directly, and from what
 /// the cells know of the other light on it. With `update` a further surface is looked at, for the cells.
 void TileGatherer::follow(Packet& packet, CellUpdate* update) {
-  startAnew(packet, hits_);
   bounce(hits_, kBounce, true, packet);
   if (!meet(packet, 1, sums_) || tracing_.request.max_surfaces == 2) return;
   Lanes<IrradianceCells::Key> keys;
@@ -293,15 +317,14 @@ Lanes<int> TileGatherer::addFromCells(const Packet& packet, Lanes<IrradianceCell
   return is_known;
 }
 
-void TileGatherer::keepGeometry(const Packet& camera_rays) {
+void TileGatherer::keepGeometry(const SeenTile& seen) {
   const auto& [ax, ay, az] = tracing_.camera_axes;
-  tile_.valid = camera_rays.valid;
+  tile_.valid = seen.valid;
+  tile_.mover = seen.mover;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const bool is_hit = camera_rays.valid[i] != 0;
-    const Vec3d p = is_hit ? Vec3d{hits_.position.x[i], hits_.position.y[i], hits_.position.z[i]} -
-                                 tracing_.pinhole
-                           : Vec3d{};
-    const Vec3d n = is_hit ? Vec3d{hits_.normal.x[i], hits_.normal.y[i], hits_.normal.z[i]} : Vec3d{};
+    const bool is_hit = seen.valid[i] != 0;
+    const Vec3d p = is_hit ? at(seen.position, i) - tracing_.pinhole : Vec3d{};
+    const Vec3d n = is_hit ? at(seen.normal, i) : Vec3d{};
     tile_.x[i] = static_cast<float>(dot(ax, p));
     tile_.y[i] = static_cast<float>(dot(ay, p));
     tile_.z[i] = static_cast<float>(dot(az, p));

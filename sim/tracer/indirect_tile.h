@@ -23,21 +23,21 @@ class TileGatherer {
   TileGatherer(const Tracing& tracing, const IrradianceCells& cells, const LitPoints& lights,
                const Channels& channels);
 
-  /// The tile whose first point is (i, j): `samples` of each point, numbered from `first_sample` on; the
-  /// first of them also looks a surface further, for the cells.
-  void gather(int i, int j, std::uint32_t first_sample, int samples, CellUpdate& update);
+  /// Finds the points of the tile whose first one is (i, j).
+  void look(int i, int j, SeenTile& seen);
+  /// Takes `samples` of each of them, numbered from `first_sample` on; the first also looks a surface further, for the cells.
+  void gather(int i, int j, const SeenTile& seen, std::uint32_t first_sample, int samples, CellUpdate& update);
   [[nodiscard]] const CoarseTile& tile() const { return tile_; }
 
  private:
-  void lookFromCamera(int i, int j, Packet& camera_rays);
-  void lookAtLights(const Packet& camera_rays);
+  void lookAtLights(const Lanes<int>& valid);
   void takeOffBlocked(const Packet& packet, std::uint32_t number, const Hits& seen);
   void follow(Packet& packet, CellUpdate* update);
   bool meet(Packet& packet, int surface, LaneSums& sums);
   void addDirect(const Packet& packet, LaneSums& sums);
   void lookFurther(const Packet& at);
   Lanes<int> addFromCells(const Packet& packet, Lanes<IrradianceCells::Key>& keys, LaneSums& sums);
-  void keepGeometry(const Packet& camera_rays);
+  void keepGeometry(const SeenTile& seen);
   template <class Work>
   void forEachChannel(const LaneSums& sums, const Work& work) const;
   void keepSums(const Lanes<int>& valid);

@@ -2,6 +2,8 @@
 #include "sim/tracer/kept_direct.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <utility>
 
 #include "sim/tracer/hit.h"
@@ -23,8 +25,8 @@ std::vector<Shade> shadesOf(const Tracing& tracing) {
     const double radius = 1.001 * standing.radius + 1e-4 * norm(c) + standing.blur;
     const auto add = [&](Vec3d to, double by) {
       shades.push_back({static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(c.z),
-                        static_cast<float>((radius + by) * (radius + by)), static_cast<float>(to.x),
-                        static_cast<float>(to.y), static_cast<float>(to.z)});
+                        static_cast<float>(radius + by), static_cast<float>(to.x), static_cast<float>(to.y),
+                        static_cast<float>(to.z)});
     };
     add({}, 0.0);
     for (const EmitterSpec& emitter : tracing.request.emitters) add(emitter.position_m, emitter.radius.in(metre));
@@ -36,34 +38,93 @@ std::vector<Shade> shadesOf(const Tracing& tracing) {
 TOFTWIN_VECTOR
 bool isNear(const BlockGeometry& pixels, const Shade& shade) {
   const Shade s = shade;
-  const float mx = s.x - s.to_x, my = s.y - s.to_y, mz = s.z - s.to_z;
+  const float mx = s.x - s.to_x, my = s.y - s.to_y, mz = s.z - s.to_z, radius2 = s.radius * s.radius;
   int any = 0;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const float dx = pixels.x[i] - s.to_x, dy = pixels.y[i] - s.to_y, dz = pixels.z[i] - s.to_z;
     const float share = (mx * dx + my * dy + mz * dz) / (dx * dx + dy * dy + dz * dz + 1e-20f);
     const float low = share > 0.0f ? share : 0.0f, t = low < 1.0f ? low : 1.0f;
     const float ax = mx - t * dx, ay = my - t * dy, az = mz - t * dz;
-    any |= (ax * ax + ay * ay + az * az <= s.radius2) | !(pixels.range_m[i] > 0.0) ? 1 : 0;
+    any |= (ax * ax + ay * ay + az * az <= radius2) | !(pixels.z[i] > 0.0f) ? 1 : 0;
   }
   return any != 0;
 }
 
+/// The same of all that lies in the ball: ways from one point into it keep within its radius of the way to its middle.
+bool isNear(const Ball& ball, const Shade& s) {
+  const float mx = s.x - s.to_x, my = s.y - s.to_y, mz = s.z - s.to_z, radius = s.radius + ball.radius;
+  const float dx = ball.x - s.to_x, dy = ball.y - s.to_y, dz = ball.z - s.to_z;
+  const float t = std::clamp((mx * dx + my * dy + mz * dz) / (dx * dx + dy * dy + dz * dz + 1e-20f), 0.0f, 1.0f);
+  const float ax = mx - t * dx, ay = my - t * dy, az = mz - t * dz;
+  return ax * ax + ay * ay + az * az <= radius * radius;
+}
+
+TOFTWIN_VECTOR
+Ball ballAround(const BlockGeometry& pixels) {
+  float x = 0.0f, y = 0.0f, z = 0.0f, square = 0.0f;
+  int is_any_nowhere = 0;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    x += pixels.x[i];
+    y += pixels.y[i];
+    z += pixels.z[i];
+    is_any_nowhere |= !(pixels.z[i] > 0.0f) ? 1 : 0;
+  }
+  x /= kLaneCount, y /= kLaneCount, z /= kLaneCount;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const float dx = pixels.x[i] - x, dy = pixels.y[i] - y, dz = pixels.z[i] - z;
+    square = std::max(square, dx * dx + dy * dy + dz * dz);
+  }
+  // Wider than rounding moves it.
+  const float radius = 1.001f * std::sqrt(square) + 1e-5f * std::sqrt(x * x + y * y + z * z);
+  return {x, y, z, is_any_nowhere != 0 ? std::numeric_limits<float>::infinity() : radius};
+}
+
 }  // namespace
 
-void KeptDirect::prepare(const Tracing& tracing, std::size_t blocks) {
+void KeptDirect::prepare(const Tracing& tracing) {
   const TraceRequest& r = tracing.request;
+  ++frame_;
+  keeps_ = tracing.scene.is_matt;
   shades_ = shadesOf(tracing);
   Key key{tracing.scene.id, r.camera, r.world_from_camera, r.emitters, r.seed, r.sampler};
-  if (key == key_ && is_kept_.size() == blocks) return;
+  if (key == key_) return;
   key_ = std::move(key);
+  const auto along = [](int pixels) { return (pixels + CoarseGrid::kStep - 1) / CoarseGrid::kStep; };
+  columns_ = along(r.camera.width);
+  rows_ = along(r.camera.height);
+  const auto blocks = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   is_kept_.assign(blocks, 0);
   in_images_.assign(blocks, InImages::Nothing);
-  ambient_.resize(tracing.scene.is_matt ? blocks : 0);
+  balls_.resize(blocks);
+  traced_in_.resize(blocks);
+  ambient_.resize(keeps_ ? blocks : 0);
   ways_.resize(ambient_.size() * r.emitters.size());
 }
 
-bool KeptDirect::isStill(const BlockGeometry& pixels) const {
-  return std::ranges::none_of(shades_, [&](const Shade& shade) { return isNear(pixels, shade); });
+bool KeptDirect::isStill(std::size_t block, const BlockGeometry& pixels) const {
+  return std::ranges::none_of(shades_, [&](const Shade& shade) {
+    return isNear(balls_[block], shade) && isNear(pixels, shade);
+  });
+}
+
+bool KeptDirect::goesOn(std::size_t block, const BlockGeometry& pixels) const {
+  return is_kept_[block] != 0 && isStill(block, pixels);
+}
+
+void KeptDirect::keep(std::size_t block, const BlockGeometry& pixels) {
+  balls_[block] = ballAround(pixels);
+  traced_in_[block] = frame_;
+  is_kept_[block] = keeps_ && isStill(block, pixels) ? 1 : 0;
+  in_images_[block] = InImages::Nothing;
+}
+
+std::uint32_t KeptDirect::newest(int left, int top, int right, int bottom) const {
+  std::uint32_t newest = 0;
+  for (int v = top; v <= std::min(bottom, rows_ - 1); ++v) {
+    for (int u = left; u <= std::min(right, columns_ - 1); ++u)
+      newest = std::max(newest, traced_in_[static_cast<std::size_t>(v * columns_ + u)]);
+  }
+  return newest;
 }
 
 void DirectTracer::trace(const Block& block, KeptDirect& kept, std::size_t index) {
@@ -109,8 +170,6 @@ void keepGeometry(const Block& block, const TruthLanes& truth, BlockGeometry& pi
     pixels.x[i] = along * static_cast<float>(x);
     pixels.y[i] = along * static_cast<float>(y);
     pixels.z[i] = along;
-    pixels.range_m[i] = static_cast<double>(range);
-    pixels.albedo[i] = is_hit ? truth.albedo[i] : 0.0f;
   }
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     pixels.normal_x[i] = truth.normal[i].x;

@@ -13,8 +13,13 @@ namespace toftwin::sim {
 
 /// A ball around a moving object and a point that straight ways lead to, in the camera's frame.
 struct Shade {
-  float x, y, z, radius2;  ///< of the ball
+  float x, y, z, radius;  ///< of the ball
   float to_x, to_y, to_z;
+};
+
+/// One around the places of a block's pixels.
+struct Ball {
+  float x, y, z, radius;  ///< infinite if one of them has no place
 };
 
 /// Direct light of blocks that no mover is near to, kept while the camera stands still: tracing it again would
@@ -32,11 +37,19 @@ class KeptDirect {
     Refined,  ///< the same, but for pixels where depth jumps
   };
 
-  /// Forgets everything that this frame's tracing would do otherwise.
-  void prepare(const Tracing& tracing, std::size_t blocks);
-  [[nodiscard]] bool isStill(const BlockGeometry& pixels) const;
-  [[nodiscard]] bool has(std::size_t block) const { return is_kept_[block] != 0; }
-  void mark(std::size_t block, bool is_kept) { is_kept_[block] = is_kept ? 1 : 0; }
+  /// Forgets everything that this frame's tracing would do otherwise. Begins a frame.
+  void prepare(const Tracing& tracing);
+  /// Whether this frame goes on with what is kept of a block.
+  [[nodiscard]] bool goesOn(std::size_t block, const BlockGeometry& pixels) const;
+  /// A block was traced.
+  void keep(std::size_t block, const BlockGeometry& pixels);
+  [[nodiscard]] int columns() const { return columns_; }  ///< of blocks
+  [[nodiscard]] int rows() const { return rows_; }
+  /// The number of this frame, from 1 on.
+  [[nodiscard]] std::uint32_t frame() const { return frame_; }
+  /// The frame in which the newest of the blocks from (left, top) to (right, bottom), as far as they lie in the image, was
+  /// traced: from then on nothing of them changed.
+  [[nodiscard]] std::uint32_t newest(int left, int top, int right, int bottom) const;
   InImages& inImages(std::size_t block) { return in_images_[block]; }
   void forgetImages() { std::fill(in_images_.begin(), in_images_.end(), InImages::Nothing); }
   /// Of all emitters.
@@ -53,8 +66,15 @@ class KeptDirect {
     Sampler sampler;
     bool operator==(const Key&) const = default;
   };
+  [[nodiscard]] bool isStill(std::size_t block, const BlockGeometry& pixels) const;
+
   Key key_{};
+  int columns_ = 0, rows_ = 0;  ///< of blocks
+  std::uint32_t frame_ = 0;
+  bool keeps_ = false;
   std::vector<Shade> shades_;
+  std::vector<Ball> balls_;
+  std::vector<std::uint32_t> traced_in_;  ///< by block: the frame
   std::vector<Ways> ways_;
   std::vector<Lanes<float>> ambient_;
   std::vector<unsigned char> is_kept_;

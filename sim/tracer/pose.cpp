@@ -63,7 +63,8 @@ void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {
   scene.rows.clear();
   for (const BuiltObject& object : scene.objects) {
     scene.rows.push_back({.planes = object.planes.empty() ? &kNoTriangle : object.planes.data(),
-                          .material = scene.materials[object.material]});
+                          .material = scene.materials[object.material],
+                          .is_paired = object.is_paired});
   }
   scene.rows.push_back({.planes = &kNoTriangle, .material = {.albedo = 0.0f}});
   scene.poses.reserve(loaded.movers.size());  // rows point to them
@@ -79,6 +80,7 @@ void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {
     standing.lower = {box.lower_x, box.lower_y, box.lower_z};
     standing.upper = {box.upper_x, box.upper_y, box.upper_z};
     standing.radius = mover.radius;
+    standing.is_paired = loaded.objects[mover.object].get().is_paired;
     scene.rows[mover.object].standing = &standing;
   }
 }
@@ -104,6 +106,7 @@ Scene Scene::at(Duration time) const {
   posed->diagonal_m = loaded->diagonal_m;
   posed->device = loaded->device;
   posed->still = loaded->still;
+  posed->still_has_pairs = loaded->still_has_pairs;
   placeMovers(*posed, *loaded, time);
   return Scene{std::move(posed)};
 }

@@ -2,7 +2,6 @@
 #include "sim/tracer/realtime.h"
 
 #include <fmt/format.h>
-#include <xmmintrin.h>
 
 #include <algorithm>
 #include <bit>
@@ -15,12 +14,13 @@
 #include "sim/tracer/depth_jumps.h"
 #include "sim/tracer/indirect.h"
 #include "sim/tracer/kept_direct.h"
+#include "sim/tracer/part.h"
 #include "sim/tracer/path.h"
 
 namespace toftwin::sim {
 namespace {
 
-constexpr int kSize = 4;  // of a block of pixels, both ways
+constexpr int kSize = Part::kSize;
 static_assert(kSize == CoarseGrid::kStep && kSize * kSize == embree::kLanes);
 
 /// Samples of indirect light for each coarse point: of a frame, and of the first one.
@@ -36,48 +36,6 @@ TraceRequest directOnly(const TraceRequest& request, int samples) {
   direct.samples_per_pixel = samples;
   return direct;
 }
-
-/// The part of an image that a block covers.
-struct Part {
-  int x, y, width, height;
-
-  Part(const Block& block, const CameraInfo& camera)
-      : x(block.x),
-        y(block.y),
-        width(std::min(kSize, camera.width - x)),
-        height(std::min(kSize, camera.height - y)) {}
-
-  /// Each pixel becomes value(lane, what it was).
-  template <class T, class Value>
-  void store(Image<T>& image, const Value& value) const {
-    for (int row = 0; row < height; ++row) {
-      T* to = &image(x, y + row);
-      const auto lane = [&](int column) { return static_cast<std::size_t>(row * kSize + column); };
-      if (width == kSize) {  // mostly, and then without a loop
-        for (int column = 0; column < kSize; ++column) to[column] = value(lane(column), to[column]);
-      } else {
-        for (int column = 0; column < width; ++column) to[column] = value(lane(column), to[column]);
-      }
-    }
-  }
-
-  void copy(Image<float>& image, const Lanes<float>& lanes) const {
-    if (width != kSize) return store(image, [&](std::size_t i, float) { return lanes[i]; });
-    for (int row = 0; row < height; ++row) _mm_storeu_ps(&image(x, y + row), _mm_load_ps(lanes.v + row * kSize));
-  }
-  /// Parts that lie apart become complex numbers.
-  void copy(Image<std::complex<float>>& image, const Lanes<float>& re, const Lanes<float>& im) const {
-    if (width != kSize) {
-      return store(image, [&](std::size_t i, std::complex<float>) { return std::complex<float>{re[i], im[i]}; });
-    }
-    for (int row = 0; row < height; ++row) {
-      const __m128 a = _mm_load_ps(re.v + row * kSize), b = _mm_load_ps(im.v + row * kSize);
-      auto* to = reinterpret_cast<float*>(&image(x, y + row));
-      _mm_storeu_ps(to, _mm_unpacklo_ps(a, b));
-      _mm_storeu_ps(to + 4, _mm_unpackhi_ps(a, b));
-    }
-  }
-};
 
 /// A packet of so many samples of each of those pixels.
 void preparePixels(const Tracing& tracing, std::span<const Pixel> pixels, std::size_t samples, Block& block) {
@@ -172,7 +130,7 @@ void RealtimeTracer::Impl::forBlocks(const CameraInfo& camera, const Work& work)
 
 void RealtimeTracer::Impl::traceDirect(const Tracing& tracing, bool is_all) {
   const BlockShape shape = BlockShape::forSamples(1);
-  kept.prepare(tracing, geometry.size());
+  kept.prepare(tracing);
   forBlocks(tracing.request.camera, [&](int begin, int end, int columns) {
     Block block;
     DirectTracer direct{tracing};
@@ -182,7 +140,7 @@ void RealtimeTracer::Impl::traceDirect(const Tracing& tracing, bool is_all) {
       block.x = i % columns * kSize;
       block.y = i / columns * kSize;
       const Part at{block, tracing.request.camera};
-      if (kept.has(index) && kept.isStill(pixels)) {
+      if (kept.goesOn(index, pixels)) {
         if (is_all) recall(at, index, direct);
         continue;
       }
@@ -190,8 +148,7 @@ void RealtimeTracer::Impl::traceDirect(const Tracing& tracing, bool is_all) {
       direct.trace(block, kept, index);
       keepGeometry(block, direct.truth, pixels);
       storeTruth(at, direct.truth);
-      kept.mark(index, tracing.scene.is_matt && kept.isStill(pixels));
-      kept.inImages(index) = KeptDirect::InImages::Nothing;
+      kept.keep(index, pixels);
       if (!tracing.scene.is_matt) {
         storeDirect(at, index, direct.sums);
       } else if (is_all) {
@@ -312,17 +269,21 @@ void RealtimeTracer::Impl::addIndirect(const Tracing& of_direct, const Tracing& 
   forBlocks(camera, [&](int begin, int end, int columns) {
     Block block;
     DirectTracer direct{of_direct};
+    BlockTruth truth;
     IndirectLight::Spread spread{indirect_channels, tracing.turns_per_metre.size()};
     for (int i = begin; i != end; ++i) {
       const auto index = static_cast<std::size_t>(i);
       block.x = i % columns * kSize;
       block.y = i / columns * kSize;
-      indirect.spread(tracing, block.x, block.y, geometry[index], spread);
+      const Part at{block, camera};
+      at.load(light.truth.range_m, truth.range_m);
+      at.load(light.truth.albedo, truth.albedo);
+      indirect.spread(tracing, block.x, block.y, geometry[index], truth, kept, spread);
       if (kept.inImages(index) == KeptDirect::InImages::Nothing) {
         direct.recall(kept, index);
-        storeWithSpread({block, camera}, spread, direct.sums);
+        storeWithSpread(at, spread, direct.sums);
       } else {
-        addSpread({block, camera}, spread);
+        addSpread(at, spread);
       }
     }
   });
@@ -371,9 +332,9 @@ void RealtimeTracer::Impl::makeFrame(const Scene& scene, const TraceRequest& req
   if (request.max_surfaces == 1) return;
   const Tracing of_direct{scene.impl(), request, nullptr, channels.orders(), channels.lastOrders()};
   const Tracing tracing{scene.impl(), request, nullptr, indirect_channels.orders(), indirect_channels.lastOrders()};
-  indirect.gather(tracing, indirect_channels, kSamples);
+  indirect.gather(tracing, indirect_channels, kept, kSamples);
   if (indirect.shareOfNew() > kMuchIsNew) {
-    for (int pass = 1; pass < kFirstPasses; ++pass) indirect.gather(tracing, indirect_channels, kSamples);
+    for (int pass = 1; pass < kFirstPasses; ++pass) indirect.gather(tracing, indirect_channels, kept, kSamples);
   }
   indirect.smooth();
   addIndirect(of_direct, tracing);

@@ -14,6 +14,7 @@
 #include "sim/tracer/hit.h"
 #include "sim/tracer/image_file.h"
 #include "sim/tracer/mesh.h"
+#include "sim/tracer/pairs.h"
 #include "sim/tracer/pose.h"
 #include "sim/tracer/scene_embree.h"
 #include "sim/tracer/scene_file.h"
@@ -219,6 +220,7 @@ struct SceneBuilder {
     object.vertices = std::move(meshes[i].vertices);
     object.triangles = std::move(meshes[i].triangles);
     object.places = std::move(meshes[i].places);
+    object.is_paired = areInPairs(object.vertices, object.triangles);
     if (const auto special = scene->materials[object.material].special; special != 0) {
       object.glass = std::get_if<bsdf::ThinGlass>(&scene->models[special - 1]);
     }
@@ -238,6 +240,7 @@ struct SceneBuilder {
       }
       moveInto(object, pose);
       addPlanes(object);
+      scene->still_has_pairs |= object.is_paired;
     }
   }
 

@@ -4,22 +4,32 @@
 #include <algorithm>
 
 #include "sim/tracer/glass.h"
+#include "sim/tracer/pairs.h"
 #include "sim/tracer/quadric_embree.h"
 
 namespace toftwin::sim {
 namespace {
 
-RTCGeometry makeTriangleGeometry(RTCDevice device, const BuiltObject& object) {
-  RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+template <std::size_t kCorners>
+void setCorners(RTCGeometry geometry, RTCFormat format, const std::vector<std::array<std::uint32_t, kCorners>>& of) {
+  void* corners = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, format, kCorners * sizeof(std::uint32_t), of.size());
+  std::ranges::copy(of, static_cast<std::array<std::uint32_t, kCorners>*>(corners));
+}
+
+RTCGeometry makeMeshGeometry(RTCDevice device, const BuiltObject& object) {
+  RTCGeometry geometry =
+      rtcNewGeometry(device, object.is_paired ? RTC_GEOMETRY_TYPE_QUAD : RTC_GEOMETRY_TYPE_TRIANGLE);
   // Embree owns its copy: a shared buffer would need 16 bytes of padding behind the last vertex.
   auto* vertices = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3,
                                            3 * sizeof(float), object.vertices.size());
   std::ranges::transform(object.vertices, static_cast<std::array<float, 3>*>(vertices), [](const Vec3d& v) {
     return std::array{static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
   });
-  auto* triangles = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                                            3 * sizeof(std::uint32_t), object.triangles.size());
-  std::ranges::copy(object.triangles, static_cast<std::array<std::uint32_t, 3>*>(triangles));
+  if (object.is_paired) {
+    setCorners(geometry, RTC_FORMAT_UINT4, quadranglesOf(object.triangles));
+  } else {
+    setCorners(geometry, RTC_FORMAT_UINT3, object.triangles);
+  }
   if (object.glass != nullptr) letShadowRaysThrough(geometry, *object.glass);
   return geometry;
 }
@@ -38,7 +48,7 @@ RTCScene makeEmbreeScene(RTCDevice device, const std::vector<NumberedObject>& ob
   RTCScene scene = newScene(device);
   for (const auto& [id, object] : objects) {
     RTCGeometry geometry = object->triangles.empty() ? makeQuadricGeometry(device, *object)
-                                                     : makeTriangleGeometry(device, *object);
+                                                     : makeMeshGeometry(device, *object);
     rtcCommitGeometry(geometry);
     rtcAttachGeometryByID(scene, geometry, id);
     rtcReleaseGeometry(geometry);

@@ -39,6 +39,7 @@ struct BuiltObject {
   std::vector<Vec3d> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::vector<TrianglePlane> planes;  ///< of the triangles
+  bool is_paired = false;             ///< Embree has each two of them as a quadrangle (pairs.h)
   std::vector<std::array<TexturePlace, 3>>
       places;  ///< of the triangles' corners, if the material has a texture
   Quadric quadric;
@@ -54,6 +55,7 @@ struct Standing {
   Vec3f lower, upper;         ///< the box around it, in its own frame
   double radius = 0.0;        ///< of the ball around it whose middle is the box's, m
   double blur = 0.0;          ///< bound on what rounding moves rays by that are taken there, m
+  bool is_paired = false;     ///< as its object
 };
 
 /// What the tracer reads of an object at each hit.
@@ -61,6 +63,7 @@ struct ObjectRow {
   const TrianglePlane* planes;  ///< of a quadric: one that makes every hit one to compute by hand
   Material material;
   const Standing* standing = nullptr;  ///< of a moving object
+  bool is_paired = false;
 };
 
 /// A moving object, scaled, and an Embree scene of it alone.
@@ -103,6 +106,7 @@ struct Scene::Impl {
 
   RTCDevice device = nullptr;
   RTCScene still = nullptr;  ///< what does not move
+  bool still_has_pairs = false;
 
   std::shared_ptr<const Impl> loaded;  ///< of a scene at another time: what it was made from
 };

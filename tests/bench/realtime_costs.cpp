@@ -10,6 +10,7 @@
 #include <fstream>
 #include <functional>
 
+#include "sim/memory/large_blocks.h"
 #include "tests/bench/realtime.h"
 
 namespace toftwin::bench {
@@ -17,7 +18,7 @@ namespace {
 
 std::size_t bytesInUse() {
   const auto info = ::mallinfo2();
-  return info.uordblks + info.hblkhd;
+  return info.uordblks + info.hblkhd + largeBytesInUse();
 }
 
 struct OfExposures {

@@ -40,7 +40,7 @@ bool keepsWhatIsWritten(LargeBlocks& blocks, unsigned seed) {
   };
   for (int i = 0; i < 600; ++i) {
     if (!held.empty() && (random() % 2 == 0 || held.size() > 24)) giveBack(random() % held.size());
-    const std::size_t bytes = LargeBlocks::kLeast + random() % (300 * kUnit);
+    const std::size_t bytes = LargeBlocks::kLeast + random() % (1200 * kUnit);
     const auto mark = static_cast<unsigned char>(random());
     auto* at = static_cast<unsigned char*>(blocks.take(bytes));
     if (at == nullptr || !blocks.has(at) || numberOf(at) % kUnit != 0) return false;
@@ -72,11 +72,12 @@ TEST(LargeBlocks, AreForLargeOnesAlone) {
 TEST(LargeBlocks, PlacesThatAreGivenBackAreOneWithThoseBesideThem) {
   LargeBlocks blocks;
   std::vector<void*> row;
-  for (int i = 0; i < 3; ++i) row.push_back(blocks.take(4 * kUnit));
-  void* behind = blocks.take(4 * kUnit);
+  for (int i = 0; i < 3; ++i) row.push_back(blocks.take(LargeBlocks::kLeast));
+  void* behind = blocks.take(LargeBlocks::kLeast);
   for (const int i : {1, 0, 2}) blocks.give(row[static_cast<std::size_t>(i)]);
-  EXPECT_EQ(blocks.take(12 * kUnit), row[0]);
-  EXPECT_GT(numberOf(blocks.take(2 * kUnit)), numberOf(behind));
+  EXPECT_EQ(blocks.take(3 * LargeBlocks::kLeast), row[0]);
+  EXPECT_GT(numberOf(blocks.take(LargeBlocks::kLeast)), numberOf(behind));
+  EXPECT_EQ(blocks.bytesInUse(), 5 * LargeBlocks::kLeast);
 }
 
 TEST(LargeBlocks, MemoryGoesBackToTheKernelButForOneChunk) {
