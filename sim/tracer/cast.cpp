@@ -79,10 +79,13 @@ bool takeInto(const Frame& frame, const int* valid, const RTCRay16& rays, int* c
 }
 
 /// Of still objects.
-void takeQuadranglesApart(const Scene::Impl& scene, RTCHit16& hits) {
+TOFTWIN_VECTOR
+void takeQuadranglesApart(const std::vector<std::uint32_t>& are_paired, RTCHit16& hits) {
+  const std::uint32_t* table = are_paired.data();
+  const auto nothing = static_cast<unsigned>(are_paired.size() - 1);
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    if (hits.geomID[i] == RTC_INVALID_GEOMETRY_ID) continue;
-    takeApart(scene.rows[hits.geomID[i]].is_paired, hits.primID[i], hits.u[i], hits.v[i]);
+    const unsigned object = hits.geomID[i] < nothing ? hits.geomID[i] : nothing;
+    takeApart(table[object] != 0, hits.primID[i], hits.u[i], hits.v[i]);
   }
 }
 
@@ -126,7 +129,7 @@ TOFTWIN_INLINE void castAtMovers(const Scene::Impl& scene, const int* valid, RTC
 TOFTWIN_VECTOR
 void castRays(const Scene::Impl& scene, const int* valid, RTCRayHit16& rays, bool coherent) {
   embree::intersect(valid, scene.still, rays, coherent);
-  if (scene.still_has_pairs) takeQuadranglesApart(scene, rays.hit);
+  if (!scene.still_pairs.empty()) takeQuadranglesApart(scene.still_pairs, rays.hit);
   for (const Standing& standing : scene.poses) {
     Lanes<int> can_meet;
     RTCRayHit16 local;

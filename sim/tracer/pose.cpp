@@ -63,8 +63,7 @@ void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {
   scene.rows.clear();
   for (const BuiltObject& object : scene.objects) {
     scene.rows.push_back({.planes = object.planes.empty() ? &kNoTriangle : object.planes.data(),
-                          .material = scene.materials[object.material],
-                          .is_paired = object.is_paired});
+                          .material = scene.materials[object.material]});
   }
   scene.rows.push_back({.planes = &kNoTriangle, .material = {.albedo = 0.0f}});
   scene.poses.reserve(loaded.movers.size());  // rows point to them
@@ -106,7 +105,7 @@ Scene Scene::at(Duration time) const {
   posed->diagonal_m = loaded->diagonal_m;
   posed->device = loaded->device;
   posed->still = loaded->still;
-  posed->still_has_pairs = loaded->still_has_pairs;
+  posed->still_pairs = loaded->still_pairs;
   placeMovers(*posed, *loaded, time);
   return Scene{std::move(posed)};
 }

@@ -240,7 +240,9 @@ struct SceneBuilder {
       }
       moveInto(object, pose);
       addPlanes(object);
-      scene->still_has_pairs |= object.is_paired;
+      if (!object.is_paired) continue;
+      scene->still_pairs.resize(file.objects.size() + 1);
+      scene->still_pairs[i] = 1;
     }
   }
 

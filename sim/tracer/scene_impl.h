@@ -63,7 +63,6 @@ struct ObjectRow {
   const TrianglePlane* planes;  ///< of a quadric: one that makes every hit one to compute by hand
   Material material;
   const Standing* standing = nullptr;  ///< of a moving object
-  bool is_paired = false;
 };
 
 /// A moving object, scaled, and an Embree scene of it alone.
@@ -106,7 +105,7 @@ struct Scene::Impl {
 
   RTCDevice device = nullptr;
   RTCScene still = nullptr;  ///< what does not move
-  bool still_has_pairs = false;
+  std::vector<std::uint32_t> still_pairs;  ///< by object, and of nothing: 1 if its triangles are in pairs; empty if none are
 
   std::shared_ptr<const Impl> loaded;  ///< of a scene at another time: what it was made from
 };
