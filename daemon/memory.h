@@ -5,8 +5,9 @@
 
 namespace toftwin::daemon {
 
-/// Images come and go with every frame. Left to itself, glibc hands their memory back to the kernel each time,
-/// and the kernel clears it again: a seventh of a simulated frame. One arena, or each thread would keep its own.
+/// Frames' memory comes and goes. Left to itself, glibc hands it back to the kernel each time, and the kernel clears it again.
+/// What is large is not glibc's (sim/memory), but that of Embree, OpenCV and other C libraries is. One arena, or each thread would
+/// keep its own.
 inline void keepFreedMemory() {
 #if defined(__GLIBC__)
   ::mallopt(M_ARENA_MAX, 1);

@@ -61,7 +61,8 @@ void* LargeBlocks::take(std::size_t bytes) {
     if (unit == 0) continue;
     at.length[unit] = static_cast<std::uint16_t>(units);
     at.used += static_cast<std::uint32_t>(units);
-    if (spare_ == number) spare_.reset();
+    spares_ -= at.is_spare;
+    at.is_spare = 0;
     if (number == opened_) ++opened_;
     return reinterpret_cast<std::byte*>(&at) + unit * kUnit;
   }
@@ -83,8 +84,9 @@ void LargeBlocks::give(void* block) {
   at.used -= length;
   length = 0;
   if (at.used != 0) return;
-  if (!spare_) {
-    spare_ = number;
+  if (spares_ < kSpares) {
+    at.is_spare = 1;
+    ++spares_;
   } else {
     ::madvise(&at, kChunk, MADV_DONTNEED);  // all zero then, as an empty chunk is
   }
@@ -99,7 +101,7 @@ std::size_t LargeBlocks::bytesInUse() const {
 
 std::size_t LargeBlocks::chunksHeld() const {
   const std::scoped_lock lock{mutex_};
-  std::size_t held = spare_ ? 1 : 0;
+  std::size_t held = spares_;
   for (std::size_t number = 0; number < opened_; ++number) held += chunk(number).used != 0 ? 1 : 0;
   return held;
 }

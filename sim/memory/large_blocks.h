@@ -5,7 +5,19 @@
 #include <cstddef>
 #include <cstdint>
 #include <mutex>
-#include <optional>
+
+// Whether operator_new.cpp has operators: sanitizers have their own. Clang says by a feature what GCC says by a macro.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#define TOFTWIN_HAS_LARGE_NEW 0
+#elif defined(__has_feature)
+#if __has_feature(address_sanitizer) || __has_feature(thread_sanitizer) || __has_feature(memory_sanitizer) || \
+    __has_feature(hwaddress_sanitizer)
+#define TOFTWIN_HAS_LARGE_NEW 0
+#endif
+#endif
+#if !defined(TOFTWIN_HAS_LARGE_NEW)
+#define TOFTWIN_HAS_LARGE_NEW 1
+#endif
 
 namespace toftwin::sim {
 
@@ -15,13 +27,14 @@ namespace toftwin::sim {
 /// clear every page anew. Thread-safe.
 ///
 /// All of it lies in one range of addresses, cut into chunks. A block is the first free place that is large enough,
-/// and places that are given back are one with the free ones beside them. One chunk without blocks is kept, the memory
+/// and places that are given back are one with the free ones beside them. Some chunks without blocks are kept, the memory
 /// of others goes back to the kernel.
 class LargeBlocks {
  public:
   static constexpr std::size_t kPage = std::size_t{2} << 20;    ///< bytes, of the large ones
   static constexpr std::size_t kUnit = std::size_t{4} << 10;    ///< of which blocks are multiples
   static constexpr std::size_t kChunk = std::size_t{32} << 20;
+  static constexpr std::size_t kSpares = 8;  ///< chunks that are kept without blocks, at most
   static constexpr std::size_t kLeast = std::size_t{32} << 10, kMost = kChunk / 2;  ///< of a block
 
   LargeBlocks() = default;
@@ -40,10 +53,15 @@ class LargeBlocks {
   /// Chunks whose memory is not the kernel's.
   [[nodiscard]] std::size_t chunksHeld() const;
 
+  // Around a fork, so that no other thread is in here while the child's copy is made.
+  void lock() { mutex_.lock(); }
+  void unlock() { mutex_.unlock(); }
+
  private:
   /// What a chunk begins with; all zero if it is empty.
   struct Chunk {
-    std::uint32_t used;  ///< units
+    std::uint32_t used;      ///< units
+    std::uint32_t is_spare;  ///< 1: it has no blocks, and its memory is kept
     std::uint16_t length[kChunk / kUnit];  ///< by unit: of the block that begins there, or 0
   };
 
@@ -53,7 +71,7 @@ class LargeBlocks {
   mutable std::mutex mutex_;
   std::atomic<std::byte*> begin_ = nullptr;  ///< of the range, once there is one
   std::size_t opened_ = 0;                   ///< chunks that ever had a block
-  std::optional<std::size_t> spare_;         ///< the one that has none, and whose memory is kept
+  std::size_t spares_ = 0;
   bool is_refused_ = false;
 };
 

@@ -1,13 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 // operator new and delete of the programs that are linked with this: what is large comes from LargeBlocks, all else from
-// the C library as ever. Sanitizers have their own.
+// the C library as ever.
+#include <pthread.h>
+
 #include <algorithm>
+#include <cstdint>
 #include <cstdlib>
 #include <new>
 
 #include "sim/memory/large_blocks.h"
 
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+#if TOFTWIN_HAS_LARGE_NEW
 
 namespace {
 
@@ -16,12 +19,18 @@ using toftwin::sim::LargeBlocks;
 /// Never destroyed: what other files hold to the end is given back after it would be.
 LargeBlocks& largeBlocks() {
   alignas(LargeBlocks) static std::byte room[sizeof(LargeBlocks)];
-  static LargeBlocks& blocks = *::new (static_cast<void*>(room)) LargeBlocks;
+  static LargeBlocks& blocks = *[] {
+    auto* made = ::new (static_cast<void*>(room)) LargeBlocks;
+    ::pthread_atfork([] { largeBlocks().lock(); }, [] { largeBlocks().unlock(); }, [] { largeBlocks().unlock(); });
+    return made;
+  }();
   return blocks;
 }
 
 void* fromLibrary(std::size_t bytes, std::size_t alignment) {
-  const auto aligned = [&](std::size_t to) { return std::aligned_alloc(to, (bytes + to - 1) / to * to); };
+  const auto aligned = [&](std::size_t to) -> void* {
+    return bytes > SIZE_MAX - to ? nullptr : std::aligned_alloc(to, (bytes + to - 1) / to * to);
+  };
   if (bytes > LargeBlocks::kMost) {
     void* block = aligned(std::max(alignment, LargeBlocks::kPage));
     if (block != nullptr) toftwin::sim::wantLargePages(block, bytes);

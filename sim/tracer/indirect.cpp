@@ -188,10 +188,12 @@ IndirectLight::~IndirectLight() = default;
 void IndirectLight::gather(const Tracing& tracing, const Channels& channels, const KeptDirect& kept, int samples) {
   const TraceRequest& request = tracing.request;
   const int width = coarse(request.camera.width), height = coarse(request.camera.height);
-  if (!cells_ || tracing.scene.id != scene_id_ || !(channels == channels_) || width != grid_.width ||
+  if (!cells_ || tracing.scene.id != scene_id_ || !(channels == channels_) ||
+      request.frequencies != frequencies_ || width != grid_.width ||
       height != grid_.height) {
     scene_id_ = tracing.scene.id;
     channels_ = channels;
+    frequencies_ = request.frequencies;
     grid_ = before_ = {};
     cells_ = std::make_unique<IrradianceCells>(tracing.scene.diagonal_m * kCellShare, channels.count());
     samples_done_ = 0;

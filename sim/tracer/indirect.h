@@ -149,6 +149,7 @@ class IndirectLight {
 
   std::string scene_id_;
   Channels channels_;
+  std::vector<Frequency> frequencies_;
   CoarseGrid grid_, before_;
   CoarseGrid smooth_;  ///< `squares` holds variances of the means
   Places places_;  ///< of the last call

@@ -55,7 +55,7 @@ void prepareTile(const Tracing& tracing, int i, int j, Block& block) {
 /// Paths that are at the points of a tile, and the hits that they are at. Where they came from does not count: light is counted
 /// as if surfaces were matt there.
 void startAt(const SeenTile& seen, PixelKey key, bool is_even, Packet& packet, Hits& hits) {
-  hits.position = seen.position;
+  hits.position = packet.origin = seen.position;
   hits.normal = packet.direction = seen.normal;
   hits.start = seen.start;
   packet.valid = seen.valid;
@@ -67,7 +67,7 @@ void startAt(const SeenTile& seen, PixelKey key, bool is_even, Packet& packet, H
     packet.length[i] = 0.0;
     hits.distance[i] = 0.0;
     hits.albedo[i] = hits.shape_a[i] = 1.0f;
-    hits.shape_b[i] = 0.0f;
+    hits.shape_b[i] = hits.emission[i] = 0.0f;
   }
 }
 

@@ -35,6 +35,8 @@ void setRays(const CameraInfo& camera, const Transform<World, Camera>& scene_fro
     row.rays.ray.mask[lane] = 0xffffffffu;
     row.rays.ray.id[lane] = static_cast<unsigned>(i);
     row.rays.ray.flags[lane] = 0;
+    row.rays.hit.primID[lane] = 0;
+    row.rays.hit.u[lane] = row.rays.hit.v[lane] = 0.0f;
     row.rays.hit.geomID[lane] = row.rays.hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
   }
 }

@@ -193,6 +193,8 @@ void setRays(const Packet& packet, RTCRayHit16& rays) {
     rays.ray.flags[i] = 0;
     rays.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
     rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+    rays.hit.primID[i] = 0;
+    rays.hit.u[i] = rays.hit.v[i] = 0.0f;
   }
 }
 

@@ -179,6 +179,60 @@ TEST(Realtime, IsTheSameWhateverWasAskedForInBetween) {
   }
 }
 
+/// Light over several surfaces is told by what was looked for in earlier frames where nothing moved: it must be the bits of
+/// looking for all of it again, which another name of the camera's calibration makes the tracer do. Neither side of the image is
+/// whole blocks. The light is where the camera is, and a rod moves along itself: of the ball around it, that has pixels traced
+/// again, its ends reach the rim, and what lies beside them is in no shadow.
+TEST(Realtime, KeepsOnlyWhatStaysTheSame) {
+  const Scene moving = sceneOf(R"(
+    [[material]]
+    name = "white"
+    albedo = 0.8
+    [[object]]
+    shape = "box"
+    size_m = [4, 2.5, 5]
+    position_m = [0, 0, 2]
+    material = "white"
+    [[object]]
+    shape = "box"
+    size_m = [0.5, 0.08, 0.08]
+    position_m = [-0.1, 0.03, 2.2]
+    material = "white"
+    velocity_m_per_s = [1.2, 0, 0])");
+  TraceRequest request = roomRequest();
+  request.camera.width -= 1;
+  request.camera.height -= 2;
+  request.emitters.front().position_m = {};
+  RealtimeTracer keeping, looking;
+  for (int frame = 0; frame < 8; ++frame) {
+    const Scene scene = moving.at(frame * 33.333333_ms);
+    const Light& kept = keeping.next(scene, request);
+    TraceRequest renamed = request;
+    renamed.camera.calibration_id = std::to_string(frame);
+    const Light& anew = looking.next(scene, renamed);
+    ASSERT_EQ(kept.phasors, anew.phasors) << frame;
+    ASSERT_EQ(kept.steady, anew.steady) << frame;
+    ASSERT_EQ(kept.variance, anew.variance) << frame;
+  }
+}
+
+/// Other frequencies begin anew: phasors of the old ones mean nothing for them.
+TEST(Realtime, ForgetsLightOfOtherFrequencies) {
+  const Scene scene = sceneOf(room(0.2));
+  TraceRequest request = roomRequest(), other = request;
+  for (Frequency& f : other.frequencies) f = 0.75 * f;
+  RealtimeTracer changed;
+  changed.next(scene, request);
+  changed.next(scene, other);
+  const Light& after = changed.next(scene, other);
+  TraceRequest exact = other;
+  exact.samples_per_pixel = 4096;
+  exact.region_width = exact.region_height = 1;
+  exact.region_x = 40, exact.region_y = 100;
+  const Complex truth = phasorAt(trace(scene, exact), 0, 0, 0);
+  EXPECT_LT(std::abs(phasorAt(after, 0, 40, 100) - truth), 0.05 * std::abs(truth));
+}
+
 TEST(Realtime, FollowsTheCamera) {
   const Scene scene = sceneOf(room(0.2));
   TraceRequest request = roomRequest();
@@ -374,6 +428,15 @@ TEST(Realtime, LeavesOutHarmonicsThatNobodyWants) {
     EXPECT_EQ(a.phasors[5], b.phasors[5]);
     EXPECT_EQ(a.steady, b.steady);
   }
+  // Of a faint one there is direct light alone.
+  std::vector<Harmonic> faint = seen;
+  faint[5] = Harmonic::Faint;
+  TraceRequest direct = request;
+  direct.max_surfaces = 1;
+  RealtimeTracer one, of_direct;
+  const Light &a = one.next(scene, request, faint), &b = of_direct.next(scene, direct);
+  EXPECT_EQ(a.phasors[5], b.phasors[5]);
+  EXPECT_NE(a.phasors[3], b.phasors[3]);
 }
 
 /// Special surfaces show their own direct light.
