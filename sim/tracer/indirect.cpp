@@ -83,7 +83,8 @@ void gatherTiles(const Tracing& tracing, const IrradianceCells& cells, const Lit
       const auto number = static_cast<std::size_t>(t);
       SeenTile& tile = seen[number];
       // The last points lie in the last blocks.
-      if (tile.frame == 0 || tile.frame < kept.newest(std::min(i, kept.columns() - 1), std::min(j, kept.rows() - 1), i + 3, j + 3)) {
+      const int left = std::min(i, kept.columns() - 1), top = std::min(j, kept.rows() - 1);
+      if (tile.frame == 0 || tile.frame < kept.newest(left, top, i + 3, j + 3)) {
         gatherer.look(i, j, tile);
         tile.frame = kept.frame();
       }

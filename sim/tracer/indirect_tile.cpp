@@ -34,7 +34,8 @@ std::uint32_t numberInSequence(std::uint32_t sample, std::size_t lane) {
 }
 
 PixelKey keyOfTile(const Tracing& tracing, int i, int j) {
-  return pixelKey(tracing.seed, static_cast<std::uint32_t>(i * CoarseGrid::kStep), static_cast<std::uint32_t>(j * CoarseGrid::kStep));
+  return pixelKey(tracing.seed, static_cast<std::uint32_t>(i * CoarseGrid::kStep),
+                  static_cast<std::uint32_t>(j * CoarseGrid::kStep));
 }
 
 void prepareTile(const Tracing& tracing, int i, int j, Block& block) {

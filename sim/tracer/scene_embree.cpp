@@ -12,7 +12,8 @@ namespace {
 
 template <std::size_t kCorners>
 void setCorners(RTCGeometry geometry, RTCFormat format, const std::vector<std::array<std::uint32_t, kCorners>>& of) {
-  void* corners = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, format, kCorners * sizeof(std::uint32_t), of.size());
+  void* corners = rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, format, kCorners * sizeof(std::uint32_t),
+                                          of.size());
   std::ranges::copy(of, static_cast<std::array<std::uint32_t, kCorners>*>(corners));
 }
 

@@ -16,7 +16,7 @@ namespace {
 
 constexpr int kSteps = 24;
 
-/// A wall of kSteps² quadrangles over [-1, 1]², as Wavefront text; `second` writes the second triangle of each.
+/// A wall of kSteps² quadrangles over [-1, 1]², as Wavefront text; turned, each second triangle begins at another corner.
 std::string wall(const std::function<double(double, double)>& z, bool is_turned) {
   std::string text;
   for (int j = 0; j <= kSteps; ++j) {
@@ -29,7 +29,8 @@ std::string wall(const std::function<double(double, double)>& z, bool is_turned)
     for (int i = 0; i < kSteps; ++i) {
       const int a = j * (kSteps + 1) + i + 1, b = a + 1, c = b + kSteps + 1, d = c - 1;
       text += fmt::format("f {0}/{0} {1}/{1} {2}/{2}\n", a, b, c);
-      text += is_turned ? fmt::format("f {1}/{1} {2}/{2} {0}/{0}\n", a, c, d) : fmt::format("f {0}/{0} {1}/{1} {2}/{2}\n", a, c, d);
+      text += is_turned ? fmt::format("f {1}/{1} {2}/{2} {0}/{0}\n", a, c, d)
+                        : fmt::format("f {0}/{0} {1}/{1} {2}/{2}\n", a, c, d);
     }
   }
   return text;

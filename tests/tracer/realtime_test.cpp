@@ -419,7 +419,8 @@ TEST(Realtime, LeavesOutHarmonicsThatNobodyWants) {
   request.frequencies = {80_MHz, 16_MHz};
   request.harmonics = 3;
   RealtimeTracer all, some;
-  const std::vector<Harmonic> seen{Harmonic::Unseen, Harmonic::Unseen, Harmonic::Unseen, Harmonic::Seen, Harmonic::Unseen, Harmonic::Seen};
+  constexpr auto kSeen = Harmonic::Seen, kUnseen = Harmonic::Unseen;
+  const std::vector<Harmonic> seen{kUnseen, kUnseen, kUnseen, kSeen, kUnseen, kSeen};
   for (int frame = 0; frame < 2; ++frame) {
     const Light &a = all.next(scene, request), &b = some.next(scene, request, seen);
     EXPECT_EQ(a.phasors[0], b.phasors[0]) << "the first harmonic always is";
