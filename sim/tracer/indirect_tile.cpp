@@ -53,25 +53,6 @@ void prepareTile(const Tracing& tracing, int i, int j, Block& block) {
   tracing.lens.raysOf(columns, rows, block.rays);
 }
 
-/// Paths that are at the points of a tile, and the hits that they are at. Where they came from does not count: light is counted
-/// as if surfaces were matt there.
-void startAt(const SeenTile& seen, PixelKey key, bool is_even, Packet& packet, Hits& hits) {
-  hits.position = packet.origin = seen.position;
-  hits.normal = packet.direction = seen.normal;
-  hits.start = seen.start;
-  packet.valid = seen.valid;
-  packet.is_even = is_even;
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    packet.key_a[i] = key.a;
-    packet.key_b[i] = key.b;
-    packet.throughput[i] = 1.0f;
-    packet.length[i] = 0.0;
-    hits.distance[i] = 0.0;
-    hits.albedo[i] = hits.shape_a[i] = 1.0f;
-    hits.shape_b[i] = hits.emission[i] = 0.0f;
-  }
-}
-
 /// Light now is counted from these hits on: as if they were white and matt, and the way to them nothing.
 void startAnew(Packet& packet, Hits& hits) {
   for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -80,6 +61,22 @@ void startAnew(Packet& packet, Hits& hits) {
     hits.distance[i] = 0.0;
     hits.albedo[i] = hits.shape_a[i] = 1.0f;
     hits.shape_b[i] = 0.0f;
+  }
+}
+
+/// Paths that start anew at the points of a tile, and the hits that they are at. Where they came from does not count: there
+/// surfaces are as if matt.
+void startAt(const SeenTile& seen, PixelKey key, bool is_even, Packet& packet, Hits& hits) {
+  startAnew(packet, hits);
+  hits.position = packet.origin = seen.position;
+  hits.normal = packet.direction = seen.normal;
+  hits.start = seen.start;
+  hits.emission = {};
+  packet.valid = seen.valid;
+  packet.is_even = is_even;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    packet.key_a[i] = key.a;
+    packet.key_b[i] = key.b;
   }
 }
 

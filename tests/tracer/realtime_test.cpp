@@ -17,9 +17,9 @@ namespace {
 
 constexpr int kWidth = 256, kHeight = 212;
 
-/// A closed room with a ball whose middle is at x.
-std::string room(double x, const std::string& motion = "") {
-  return fmt::format(R"(
+/// A closed room with a white thing in it.
+std::string roomWith(const std::string& thing) {
+  return R"(
     [[material]]
     name = "white"
     albedo = 0.8
@@ -29,11 +29,13 @@ std::string room(double x, const std::string& motion = "") {
     position_m = [0, 0, 2]
     material = "white"
     [[object]]
-    shape = "sphere"
-    radius_m = 0.4
-    position_m = [{}, 0.1, 2.2]
     material = "white"
-    {})", x, motion);
+    )" + thing;
+}
+
+/// With a ball whose middle is at x.
+std::string room(double x, const std::string& motion = "") {
+  return roomWith(fmt::format("shape = 'sphere'\nradius_m = 0.4\nposition_m = [{}, 0.1, 2.2]\n{}", x, motion));
 }
 
 /// The middle of a Kinect's image: as many pixels per degree, and its emitter.
@@ -184,21 +186,8 @@ TEST(Realtime, IsTheSameWhateverWasAskedForInBetween) {
 /// whole blocks. The light is where the camera is, and a rod moves along itself: of the ball around it, that has pixels traced
 /// again, its ends reach the rim, and what lies beside them is in no shadow.
 TEST(Realtime, KeepsOnlyWhatStaysTheSame) {
-  const Scene moving = sceneOf(R"(
-    [[material]]
-    name = "white"
-    albedo = 0.8
-    [[object]]
-    shape = "box"
-    size_m = [4, 2.5, 5]
-    position_m = [0, 0, 2]
-    material = "white"
-    [[object]]
-    shape = "box"
-    size_m = [0.5, 0.08, 0.08]
-    position_m = [-0.1, 0.03, 2.2]
-    material = "white"
-    velocity_m_per_s = [1.2, 0, 0])");
+  const Scene moving = sceneOf(roomWith("shape = 'box'\nsize_m = [0.5, 0.08, 0.08]\nposition_m = [-0.1, 0.03, 2.2]\n"
+                                        "velocity_m_per_s = [1.2, 0, 0]"));
   TraceRequest request = roomRequest();
   request.camera.width -= 1;
   request.camera.height -= 2;

@@ -2,7 +2,6 @@
 #include <fmt/format.h>
 
 #include <filesystem>
-#include <fstream>
 #include <memory>
 #include <optional>
 #include <string>
@@ -14,6 +13,7 @@
 #include "tools/cli/arguments.h"
 #include "tools/cli/command.h"
 #include "tools/cli/discover_campaign.h"
+#include "tools/cli/export/atomic_file.h"
 
 namespace toftwin::cli {
 namespace discover_command {
@@ -52,11 +52,7 @@ Result<> writeCamera(const discover::TableDiscovery& discovery, const discover::
   const auto mended = discover::cameraWith(discovery, camera);
   if (!mended) return mended.error();
   for (const std::string& note : mended->notes) fmt::print("note: {}\n", note);
-  const auto file = folder / "camera.toml";
-  std::ofstream out{file, std::ios::binary | std::ios::trunc};
-  out << mended->toml << std::flush;
-  if (!out) return Error{Error::Code::StorageFull, fmt::format("{}: cannot be written", file.string())};
-  return {};
+  return writeWhole(folder / "camera.toml", mended->toml);
 }
 
 Result<Exit> act(const Options& options) {
