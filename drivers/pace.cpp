@@ -5,6 +5,7 @@
 #include <cmath>
 #include <condition_variable>
 #include <mutex>
+#include <utility>
 
 namespace toftwin::drivers {
 
@@ -54,6 +55,26 @@ void Pacer::setPace(Pace pace) {
   triggers_ = 0;
 }
 
+nanoseconds Pacer::lateness(std::uint64_t index) const {
+  return duration_cast<nanoseconds>(std::chrono::steady_clock::now() - *since_) - nanoseconds{deviceTimeOf(index).ns};
+}
+
+std::uint64_t Pacer::turnsLost(std::uint64_t index) const {
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(0, lateness(index).count() / interval_ns_));
+}
+
+DeviceTime Pacer::chooseNext() {
+  lost_ = since_ ? turnsLost(index_ + 1) : 0;
+  next_ = index_ + 1 + lost_;
+  return deviceTimeOf(*next_);
+}
+
+void Pacer::advance() {
+  is_chosen_ = next_.has_value();
+  index_ = next_.value_or(index_ + 1);
+  next_.reset();
+}
+
 void Pacer::restart() {
   since_.reset();
   triggers_ = 0;
@@ -65,11 +86,11 @@ Result<std::uint64_t> Pacer::waitForTurn(const std::stop_token& stop, bool locks
   if (lockstep || pace_ == Pace::Fast) {
     since_.reset();
     clock_ = {};  // device time no longer runs with the host's
-    return std::uint64_t{0};
+    return takeTurn();
   }
   const SteadyTime now = std::chrono::steady_clock::now();
   if (pace_ == Pace::Trigger) {
-    if (triggers_ > 0) return --triggers_, std::uint64_t{0};
+    if (triggers_ > 0) return --triggers_, takeTurn();
     if (!sleepUntil(now + kLongestWait, stop)) return stopped;
     return Error{Error::Code::Timeout, "no trigger within a second"};
   }
@@ -77,15 +98,23 @@ Result<std::uint64_t> Pacer::waitForTurn(const std::stop_token& stop, bool locks
     since_ = now - nanoseconds{deviceTime().ns};
     clock_ = relateToHost(deviceTime(), now);
   }
-  const SteadyTime due = *since_ + nanoseconds{deviceTime().ns};
-  if (now > due) {
-    const auto lost = static_cast<std::uint64_t>((now - due).count() / interval_ns_);
-    index_ += lost;
-    return lost;
+  const nanoseconds late = lateness(index_);
+  if (late > nanoseconds{0}) {
+    if (!is_chosen_ || late > kLongestWait) {
+      const std::uint64_t lost = turnsLost(index_);
+      index_ += lost;
+      lost_ += lost;
+    }
+    return takeTurn();
   }
-  if (!sleepUntil(std::min(due, now + kLongestWait), stop)) return stopped;
-  if (due - now > kLongestWait) return Error{Error::Code::Timeout, "not yet"};
-  return std::uint64_t{0};
+  if (!sleepUntil(now + std::min(-late, nanoseconds{kLongestWait}), stop)) return stopped;
+  if (-late > kLongestWait) return Error{Error::Code::Timeout, "not yet"};
+  return takeTurn();
+}
+
+std::uint64_t Pacer::takeTurn() {
+  is_chosen_ = false;
+  return std::exchange(lost_, 0);
 }
 
 }  // namespace toftwin::drivers

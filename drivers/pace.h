@@ -45,8 +45,11 @@ class Pacer {
   /// all (Fast, lockstep). Gives how many frames were due meanwhile and are lost, as a camera would have
   /// lost them; they are counted already. Errors: Stopped, Timeout.
   Result<std::uint64_t> waitForTurn(const std::stop_token& stop, bool lockstep);
+  /// Chooses the next frame's turn already now, while the present one is made: turns that are due by now are lost but for
+  /// the last. waitForTurn() will say so, and count others only if the frame is a second late. Gives its device time.
+  DeviceTime chooseNext();
   /// The frame was made.
-  void advance() { ++index_; }
+  void advance();
   void trigger() { ++triggers_; }
   /// From the next frame on; device time goes on from where it is.
   void setInterval(Duration frame_interval);
@@ -54,18 +57,29 @@ class Pacer {
 
   /// Of the next frame since the source was opened, lost ones counted.
   [[nodiscard]] std::uint64_t index() const { return index_; }
-  [[nodiscard]] DeviceTime deviceTime() const {
-    return {base_ns_ + static_cast<std::int64_t>(index_ - base_index_) * interval_ns_};
-  }
+  [[nodiscard]] DeviceTime deviceTime() const { return deviceTimeOf(index_); }
   /// Unknown unless the last turn was paced in real time.
   [[nodiscard]] const ClockRelation& clock() const { return clock_; }
 
  private:
+  [[nodiscard]] DeviceTime deviceTimeOf(std::uint64_t index) const {
+    return {base_ns_ + static_cast<std::int64_t>(index - base_index_) * interval_ns_};
+  }
+  /// In real time: since it was due; negative before.
+  [[nodiscard]] std::chrono::nanoseconds lateness(std::uint64_t index) const;
+  /// How many turns after it are due by now.
+  [[nodiscard]] std::uint64_t turnsLost(std::uint64_t index) const;
+  /// Begins the present frame. How many were lost before it.
+  std::uint64_t takeTurn();
+
   Pace pace_;
   std::int64_t interval_ns_;
   std::uint64_t index_ = 0;
   std::uint64_t base_index_ = 0;  ///< of the first frame with this interval,
   std::int64_t base_ns_ = 0;      ///< and its device time
+  std::optional<std::uint64_t> next_;  ///< chosen while the present one is made
+  bool is_chosen_ = false;             ///< the present one was
+  std::uint64_t lost_ = 0;             ///< for the chosen one
   std::uint64_t triggers_ = 0;
   std::optional<SteadyTime> since_;  ///< when device time 0 was, if paced in real time
   ClockRelation clock_;

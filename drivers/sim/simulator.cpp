@@ -14,6 +14,7 @@
 #include "drivers/sim/operating.h"
 #include "drivers/sim/view.h"
 #include "protocol/settings/describe.h"
+#include "sim/images/rows.h"
 #include "sim/sensor/collect_moving.h"
 #include "sim/sensor/frame_assembly.h"
 #include "sim/sensor/sensor_model.h"
@@ -121,7 +122,13 @@ class SimulatedSource final : public Source {
     frame.provenance = sim::provenanceOf(model_, view_.scene().id(), keys_.seed);
     operating_.note(frame.provenance);
     frame.camera = info_.camera;
-    frame.planes = expose(frame.moment);
+    const bool is_last = made_ + 1 == keys_.frames;
+    if (view_.isRealtime() && !lockstep && !is_last && !info_.can_trigger && ++frames_at_pose_ > kLongAtPose) {
+      const Duration next = sim::middleOf(momentAt(pacer_.chooseNext()));
+      sim::together([&] { frame.planes = expose(frame.moment); }, [&] { view_.beginFrame(next); });
+    } else {
+      frame.planes = expose(frame.moment);
+    }
     pacer_.advance();
     ++made_;
     return frame;
@@ -155,6 +162,7 @@ class SimulatedSource final : public Source {
     }
     if (world_from_camera == view_.pose()) return {};
     view_.setPose(world_from_camera);
+    frames_at_pose_ = 0;
     collected_.reset();
     return {};
   }
@@ -224,7 +232,7 @@ class SimulatedSource final : public Source {
     model_ = std::move(changed);
     operating_ = std::move(operating);
     view_.setFrequencies(model_.traceRequest().frequencies,
-                         model_.hasPhasors() ? model_.correlatedTerms() : std::vector<sim::Harmonic>{});
+                         model_.hasPhasors() ? model_.correlatedTerms() : std::vector<sim::SeenHarmonic>{});
     info_.planes = planesNow();
     collected_.reset();
     return {};
@@ -337,11 +345,12 @@ class SimulatedSource final : public Source {
     return static_cast<double>(pacer_.deviceTime().ns) * nanosecond;
   }
 
-  [[nodiscard]] Moment momentOfFrame() const {
+  [[nodiscard]] Moment momentOfFrame() const { return momentAt(pacer_.deviceTime()); }
+  [[nodiscard]] Moment momentAt(DeviceTime start) const {
     Moment moment;
-    moment.exposures = model_.exposures(pacer_.deviceTime());
+    moment.exposures = model_.exposures(start);
     moment.clock = pacer_.clock();
-    moment.since_power_on = since_power_on_ + deviceDuration();
+    moment.since_power_on = since_power_on_ + static_cast<double>(start.ns) * nanosecond;
     moment.temperatures = model_.temperatures(room_temperature_, *moment.since_power_on);
     moment.temperatures.push_back({"room", room_temperature_});
     moment.ambient = ambient_;
@@ -366,6 +375,10 @@ class SimulatedSource final : public Source {
   std::optional<sim::RangeImage> last_range_;
   Pacer pacer_;  ///< its frame index keys the noise
   std::uint64_t made_ = 0;  ///< since start()
+  /// In real time a frame's light is begun while the one before is still exposed, once the pose has stayed for a while: a pose
+  /// that is set after that would make it of no use.
+  static constexpr int kLongAtPose = 15;
+  int frames_at_pose_ = 0;
   Duration since_power_on_;  ///< at device time 0
   Temperature room_temperature_;
   Illuminance ambient_;

@@ -28,7 +28,11 @@ void View::setPose(const Transform<World, Camera>& world_from_camera) {
   forget();
 }
 
-void View::setFrequencies(std::vector<Frequency> frequencies, std::vector<sim::Harmonic> seen) {
+void View::setFrequencies(std::vector<Frequency> frequencies, std::vector<sim::SeenHarmonic> seen) {
+  if (realtime_ && frequencies == request_.frequencies && seen != seen_) {
+    seen_ = std::move(seen);
+    begun_.reset();
+  }
   if (frequencies == request_.frequencies) return;
   request_.frequencies = std::move(frequencies);
   own_ = {};
@@ -46,15 +50,27 @@ void View::moveTo(Duration time, std::uint64_t number) {
   forget();
 }
 
-void View::goRealtime(std::vector<sim::Harmonic> seen) {
+void View::goRealtime(std::vector<sim::SeenHarmonic> seen) {
   realtime_.emplace();
+  begun_.reset();
   seen_ = std::move(seen);
 }
 
-void View::traceFrame(Duration time) {
+sim::TraceRequest View::requestAt(Duration time) const {
   sim::TraceRequest request = request_;
   request.world_from_camera = poseAt(time);
-  realtime_light_ = &realtime_->next(scene_.moves() ? scene_.at(time) : scene_, request, seen_);
+  return request;
+}
+
+void View::traceFrame(Duration time) {
+  const bool is_begun = begun_ == Begun{time, poseAt(time)};
+  realtime_light_ = is_begun ? &realtime_->finish() : &realtime_->next(sceneAt(time), requestAt(time), seen_);
+  begun_.reset();
+}
+
+void View::beginFrame(Duration time) {
+  realtime_->begin(sceneAt(time), requestAt(time), seen_);
+  begun_ = {time, poseAt(time)};
 }
 
 bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const {

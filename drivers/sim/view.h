@@ -34,7 +34,7 @@ class View {
   void setPose(const Transform<World, Camera>& world_from_camera);
 
   /// Looks with those frequencies from now on, of which those phasors are wanted in real time.
-  void setFrequencies(std::vector<Frequency> frequencies, std::vector<sim::Harmonic> seen);
+  void setFrequencies(std::vector<Frequency> frequencies, std::vector<sim::SeenHarmonic> seen);
 
   /// Whether raw exposures see different light: scene or camera move, or another camera's light beats.
   [[nodiscard]] bool changesWithTime() const { return moves() || !scene_.foreignEmitters().empty(); }
@@ -51,10 +51,12 @@ class View {
   [[nodiscard]] const sim::Light& light() const { return realtime_light_ != nullptr ? *realtime_light_ : own_.light; }
 
   /// From now on light is traced frame by frame, those of its phasors that are wanted.
-  void goRealtime(std::vector<sim::Harmonic> seen);
+  void goRealtime(std::vector<sim::SeenHarmonic> seen);
   [[nodiscard]] bool isRealtime() const { return realtime_.has_value(); }
   /// Traces the light of one frame, as it is at a time since device time 0.
   void traceFrame(Duration time);
+  /// Begins what traceFrame() will be asked for unless the pose changes; meanwhile others may read light().
+  void beginFrame(Duration time);
   /// The same with what other cameras add to a raw exposure.
   [[nodiscard]] const sim::Light& lightFor(const Exposure& exposure);
 
@@ -72,10 +74,18 @@ class View {
     int rows_done = 0;
   };
   [[nodiscard]] bool moves() const { return scene_.moves() || !camera_.isStill(); }
+  [[nodiscard]] sim::Scene sceneAt(Duration time) const { return scene_.moves() ? scene_.at(time) : scene_; }
+  [[nodiscard]] sim::TraceRequest requestAt(Duration time) const;
   bool complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const;
   void forget();
   std::optional<sim::RealtimeTracer> realtime_;
-  std::vector<sim::Harmonic> seen_;                ///< in real time
+  std::vector<sim::SeenHarmonic> seen_;                ///< in real time
+  struct Begun {
+    Duration time;
+    Transform<World, Camera> pose;
+    bool operator==(const Begun&) const = default;
+  };
+  std::optional<Begun> begun_;  ///< by beginFrame()
   const sim::Light* realtime_light_ = nullptr;      ///< the tracer's
   Pass own_;
   std::vector<Pass> foreign_{scene_.foreignEmitters().size()};

@@ -57,18 +57,15 @@ class KinectV2Decoder::Impl {
   }
 
   RangeImage finish() {
+    Rooms<Rows> rooms;
     forRows(height_, [&](int first, int last) {
-      Rows rows{static_cast<std::size_t>(width_)};
-      std::vector<BilateralRows> filters;
-      filters.reserve(kFrequencies);
-      for (std::size_t f = 0; kinect_.bilateral_filter && f < kFrequencies; ++f) {
-        const auto least = static_cast<float>(kinect_.bilateral_threshold_counts / counts_[f]);
-        filters.emplace_back(result_.phasors[f], least, flags_);
-      }
-      for (int y = first; y < last; ++y) {
-        if (kinect_.bilateral_filter) filter(y, filters, rows);
-        measureRow(y, rows);
-      }
+      rooms.use([&] { return rowsToWorkIn(); },
+                [&](Rows& rows) {
+                  for (int y = first; y < last; ++y) {
+                    if (kinect_.bilateral_filter) filter(y, rows);
+                    measureRow(y, rows);
+                  }
+                });
     });
     if (kinect_.edge_filter) dropEdges();
     return std::move(result_);
@@ -91,7 +88,16 @@ class KinectV2Decoder::Impl {
     std::vector<float> zeros, ones;
     std::vector<double> deviation, strongest;
     std::vector<std::uint32_t> why;
+    std::vector<BilateralRows> filters;  ///< by frequency, if there is that filter
   };
+  [[nodiscard]] Rows rowsToWorkIn() const {
+    Rows rows{static_cast<std::size_t>(width_)};
+    for (std::size_t f = 0; kinect_.bilateral_filter && f < kFrequencies; ++f) {
+      const auto least = static_cast<float>(kinect_.bilateral_threshold_counts / counts_[f]);
+      rows.filters.emplace_back(result_.phasors[f], least, flags_);
+    }
+    return rows;
+  }
 
   void demodulate(const Samples& samples, int from, int y) {
     const auto columns = static_cast<std::size_t>(width_);
@@ -105,9 +111,9 @@ class KinectV2Decoder::Impl {
   }
 
   /// Saturated pixels have no phase that others could take.
-  void filter(int y, std::vector<BilateralRows>& filters, Rows& rows) {
+  void filter(int y, Rows& rows) {
     for (std::size_t f = 0; f < kFrequencies; ++f) {
-      filters[f].row(y, rows.filtered[f].data(), rows.unlikeness.data());
+      rows.filters[f].row(y, rows.filtered[f].data(), rows.unlikeness.data());
       markEdges(rows.unlikeness, static_cast<float>(kinect_.edge_unlikeness),
                 {&is_edge_(0, y), rows.unlikeness.size()});
     }

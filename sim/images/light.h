@@ -30,6 +30,18 @@ struct ModulationError {
 /// fundamental has.
 enum class Harmonic : std::uint8_t { Unseen, Faint, Seen };
 
+/// The same, and whether the camera's few steps can tell it from the first one at all. If not, P₁ + w Pₙ, or P₁ + conj(w Pₙ) where
+/// it is mirrored, is all that they see of both: it is folded.
+struct SeenHarmonic {
+  // NOLINTNEXTLINE(google-explicit-constructor): mostly that is all there is to say
+  SeenHarmonic(Harmonic as = Harmonic::Seen) : how(as) {}
+  bool operator==(const SeenHarmonic&) const = default;
+
+  Harmonic how;
+  bool is_folded = false, is_mirrored = false;
+  std::complex<float> beside_first{};  ///< w, if it is folded
+};
+
 /// The light that reaches each pixel from the camera's own emitters, before any electronics.
 ///
 /// `phasors[f * harmonics + (n - 1)]` holds, for modulation frequency f and harmonic n = 1 … harmonics,

@@ -3,6 +3,7 @@
 
 #include <tbb/blocked_range.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_invoke.h>
 #include <tbb/task_arena.h>
 
 #include <algorithm>
@@ -33,6 +34,17 @@ template <class Work>
 void inFewParts(int count, int least, const Work& work) {
   constexpr int kPartsOfThread = 4;
   inParallel(count, std::max(least, count / (kPartsOfThread * tbb::this_task_arena::max_concurrency())), work);
+}
+
+/// Does both, at the same time as far as there are threads.
+template <class First, class Second>
+void together(const First& first, const Second& second) {
+#if defined(__SANITIZE_THREAD__)
+  first();
+  second();
+#else
+  tbb::parallel_invoke(first, second);
+#endif
 }
 
 /// What parts of parallel work write into, taken up by another part when one has ended: no more of them are made than

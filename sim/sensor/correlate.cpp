@@ -16,16 +16,29 @@ constexpr double kNoContent = 1e-12;
 /// One below this is faint (Harmonic).
 constexpr double kFaintContent = 0.05;
 
-/// modulated += Re(weight · phasors), whose parts alternate.
+/// modulated += or = Re(weight · phasors), whose parts alternate.
 TOFTWIN_SIMD void addModulated(const float* __restrict phasors, float real, float imaginary, int width,
                                float* __restrict modulated) {
   for (int x = 0; x < width; ++x) modulated[x] += real * phasors[2 * x] - imaginary * phasors[2 * x + 1];
 }
+TOFTWIN_SIMD void setModulated(const float* __restrict phasors, float real, float imaginary, int width,
+                               float* __restrict modulated) {
+  for (int x = 0; x < width; ++x) modulated[x] = real * phasors[2 * x] - imaginary * phasors[2 * x + 1];
+}
 
-TOFTWIN_SIMD void fillTap(const float* __restrict steady, const float* __restrict ambient,
-                          const float* __restrict modulated, float half_gain, float sign, int width,
-                          float* __restrict electrons) {
-  for (int x = 0; x < width; ++x) electrons[x] = half_gain * (steady[x] + ambient[x]) + sign * modulated[x];
+/// Both taps; the second may be null.
+TOFTWIN_SIMD void fillTaps(const float* __restrict steady, const float* __restrict ambient,
+                           const float* __restrict modulated, float half_gain, int width, float* __restrict first,
+                           float* __restrict second) {
+  if (second == nullptr) {
+    for (int x = 0; x < width; ++x) first[x] = half_gain * (steady[x] + ambient[x]) + modulated[x];
+    return;
+  }
+  for (int x = 0; x < width; ++x) {
+    const float even = half_gain * (steady[x] + ambient[x]);
+    first[x] = even + modulated[x];
+    second[x] = even - modulated[x];
+  }
 }
 
 }  // namespace
@@ -72,6 +85,23 @@ std::vector<Harmonic> correlatedTerms(const std::vector<Response>& responses, in
                      : content < kFaintContent ? Harmonic::Faint
                                                : Harmonic::Seen);
     }
+  }
+  return seen;
+}
+
+std::vector<SeenHarmonic> foldedTerms(const std::vector<Response>& responses, int harmonics, int steps) {
+  const std::vector<Harmonic> terms = correlatedTerms(responses, harmonics);
+  std::vector<SeenHarmonic> seen(terms.begin(), terms.end());
+  for (std::size_t term = 0; term < seen.size(); ++term) {
+    const std::size_t i = term % static_cast<std::size_t>(harmonics);
+    const int n = static_cast<int>(i) + 1;
+    const bool is_alike = n % steps == 1 % steps, is_mirrored = !is_alike && (n + 1) % steps == 0;
+    SeenHarmonic& harmonic = seen[term];
+    if (i == 0 || harmonic.how != Harmonic::Faint || !(is_alike || is_mirrored)) continue;
+    const auto& contents = responses[term / static_cast<std::size_t>(harmonics)].harmonics;
+    harmonic.is_folded = true;
+    harmonic.is_mirrored = is_mirrored;
+    harmonic.beside_first = std::complex<float>{contents[i] / contents[0]};
   }
   return seen;
 }
@@ -143,16 +173,16 @@ void Correlator::collect(int top, int first, int last, Samples& samples) const {
       const int count = std::min(kPiece, light_.width() - x);
       Image<float>* electrons = samples.electrons.data();
       for (const Step& step : steps_) {
-        std::fill_n(modulated, count, 0.0F);
-        for (const Weight& weight : step.weights) {
+        if (step.weights.empty()) std::fill_n(modulated, count, 0.0F);
+        for (std::size_t i = 0; i < step.weights.size(); ++i) {
+          const Weight& weight = step.weights[i];
           // A complex number is an array of two.
           const auto* parts = reinterpret_cast<const float*>(&(*weight.phasors)(x, top + y));
-          addModulated(parts, weight.real, weight.imaginary, count, modulated);
+          (i == 0 ? setModulated : addModulated)(parts, weight.real, weight.imaginary, count, modulated);
         }
-        for (int tap = 0; tap < taps_; ++tap, ++electrons) {
-          fillTap(&light_.steady(x, top + y), &light_.ambient(x, top + y), modulated, step.half_gain,
-                  tap == 0 ? 1.0F : -1.0F, count, &(*electrons)(x, y));
-        }
+        fillTaps(&light_.steady(x, top + y), &light_.ambient(x, top + y), modulated, step.half_gain, count,
+                 &electrons[0](x, y), taps_ == 2 ? &electrons[1](x, y) : nullptr);
+        electrons += taps_;
       }
     }
   }

@@ -162,10 +162,21 @@ std::optional<LensPair> SensorModel::colorLens() const {
 
 bool SensorModel::hasPhasors() const { return !impl_->file.isPulsed(); }
 
-std::vector<Harmonic> SensorModel::correlatedTerms() const {
-  const auto harmonics = static_cast<std::size_t>(impl_->file.sampling.harmonics);
-  if (impl_->addsHarmonics()) return std::vector<Harmonic>(impl_->responses.size() * harmonics, Harmonic::Seen);
-  return sim::correlatedTerms(impl_->responses, impl_->file.sampling.harmonics);
+std::vector<SeenHarmonic> SensorModel::correlatedTerms() const {
+  const int harmonics = impl_->file.sampling.harmonics;
+  if (impl_->addsHarmonics())
+    return std::vector<SeenHarmonic>(impl_->responses.size() * static_cast<std::size_t>(harmonics), Harmonic::Seen);
+  // Others than these may treat harmonics each in its own way.
+  const bool can_fold = std::ranges::all_of(impl_->effects, [](const AnyEffect& any) {
+    return std::visit(
+        []<class E>(const E&) {
+          return !std::is_same_v<ImageOf<E>, Light> || std::is_same_v<E, LensScatter> || std::is_same_v<E, AmbientLight>;
+        },
+        any);
+  });
+  if (can_fold) return foldedTerms(impl_->responses, harmonics, impl_->file.sampling.steps);
+  const std::vector<Harmonic> terms = sim::correlatedTerms(impl_->responses, harmonics);
+  return {terms.begin(), terms.end()};
 }
 
 std::vector<std::string> SensorModel::effectNames() const {

@@ -70,7 +70,7 @@ class SensorModel {
   /// Whether it demodulates; a pulsed camera has no phasors.
   [[nodiscard]] bool hasPhasors() const;
   /// How collect() sees the phasors of the light, in their order; those unseen may be empty images.
-  [[nodiscard]] std::vector<Harmonic> correlatedTerms() const;
+  [[nodiscard]] std::vector<SeenHarmonic> correlatedTerms() const;
   /// The raw exposures of a frame that starts at `start`: frequency by frequency, step by step.
   [[nodiscard]] std::vector<Exposure> exposures(DeviceTime start) const;
   /// From the start of a frame's first raw exposure to the end of its last.

@@ -128,7 +128,11 @@ TOFTWIN_INLINE void castAtMovers(const Scene::Impl& scene, const int* valid, RTC
 
 TOFTWIN_VECTOR
 void castRays(const Scene::Impl& scene, const int* valid, RTCRayHit16& rays, bool coherent) {
-  embree::intersect(valid, scene.still, rays, coherent);
+  if (!scene.still_few.empty()) {
+    intersectFew(scene.still_few, valid, rays);
+  } else {
+    embree::intersect(valid, scene.still, rays, coherent);
+  }
   if (!scene.still_pairs.empty()) takeQuadranglesApart(scene.still_pairs, rays.hit);
   for (const Standing& standing : scene.poses) {
     Lanes<int> can_meet;
@@ -143,7 +147,11 @@ void castRays(const Scene::Impl& scene, const int* valid, RTCRayHit16& rays, boo
 
 TOFTWIN_VECTOR
 void castShadowRays(const Scene::Impl& scene, const int* valid, RTCRay16& rays, bool coherent) {
-  embree::occluded(valid, scene.still, rays, coherent);
+  if (!scene.still_few.empty()) {
+    occludedFew(scene.still_few, valid, rays);
+  } else {
+    embree::occluded(valid, scene.still, rays, coherent);
+  }
   castAtMovers(scene, valid, rays, [&](const int* can_meet, RTCScene mover, RTCRay16& local) {
     embree::occluded(can_meet, mover, local, coherent);
   });

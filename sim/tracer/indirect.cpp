@@ -75,9 +75,7 @@ void gatherTiles(const Tracing& tracing, const IrradianceCells& cells, const Lit
   const int columns = (grid.width + 3) / 4, rows = (grid.height + 3) / 4;
   updates.resize(static_cast<std::size_t>(columns * rows));
   seen.resize(updates.size());
-  inParallel(columns * rows, 8, [&](int begin, int end) {
-    const FlushDenormals flush;
-    TileGatherer gatherer{tracing, cells, lights, channels};
+  const auto gather = [&](TileGatherer& gatherer, int begin, int end) {
     for (int t = begin; t != end; ++t) {
       const int i = t % columns * 4, j = t / columns * 4;
       const auto number = static_cast<std::size_t>(t);
@@ -91,6 +89,12 @@ void gatherTiles(const Tracing& tracing, const IrradianceCells& cells, const Lit
       gatherer.gather(i, j, tile, first_sample, samples, updates[number]);
       store(gatherer.tile(), channels, i, j, samples, grid);
     }
+  };
+  Rooms<TileGatherer> gatherers;
+  inParallel(columns * rows, 8, [&](int begin, int end) {
+    const FlushDenormals flush;
+    gatherers.use([&] { return TileGatherer{tracing, cells, lights, channels}; },
+                  [&](TileGatherer& gatherer) { gather(gatherer, begin, end); });
   });
 }
 
@@ -136,13 +140,18 @@ void CoarseGrid::resizeWithLit(int new_width, int new_height, std::size_t channe
   mover = Image<int>(width, height);
 }
 
-Channels::Channels(const TraceRequest& request, std::span<const Harmonic> seen, Harmonic least) {
+Channels::Channels(const TraceRequest& request, std::span<const SeenHarmonic> seen, Harmonic least) {
   const auto harmonics = static_cast<std::size_t>(request.harmonics);
   for (std::size_t term = 0; term < request.frequencies.size() * harmonics; ++term) {
     const bool is_first = term % harmonics == 0;
     if (is_first) firsts_.push_back(terms_.size());
     if (is_first) last_orders_.push_back(1);
-    if (!is_first && !seen.empty() && seen[term] < least) continue;
+    if (!is_first && !seen.empty() && seen[term].how < least) continue;
+    if (!is_first && !seen.empty() && seen[term].is_folded) {
+      folds_.push_back({terms_.size(), firsts_.back(), seen[term].beside_first, seen[term].is_mirrored});
+    } else {
+      shown_.push_back({term, terms_.size()});
+    }
     terms_.push_back(term);
     const int order = last_orders_.back() = static_cast<int>(term % harmonics) + 1;
     orders_of_terms_.push_back(order);

@@ -41,7 +41,15 @@ struct CoarseGrid {
 class Channels {
  public:
   /// Those that are at least so well seen, by term of the request (Light::phasors); if `seen` is empty, all.
-  explicit Channels(const TraceRequest& request = {}, std::span<const Harmonic> seen = {}, Harmonic least = Harmonic::Faint);
+  explicit Channels(const TraceRequest& request = {}, std::span<const SeenHarmonic> seen = {},
+                    Harmonic least = Harmonic::Faint);
+  /// A phasor without an image of its own: what it adds to its frequency's first one.
+  struct Fold {
+    std::size_t phasor, first;
+    std::complex<float> weight;
+    bool is_mirrored;
+    bool operator==(const Fold&) const = default;
+  };
   bool operator==(const Channels&) const = default;
 
   static constexpr std::size_t kSteady = 0, kAmbient = 1;
@@ -57,12 +65,21 @@ class Channels {
   [[nodiscard]] const std::vector<int>& orders() const { return orders_; }
   /// Each frequency's last that is wanted.
   [[nodiscard]] const std::vector<int>& lastOrders() const { return last_orders_; }
+  [[nodiscard]] const std::vector<Fold>& folds() const { return folds_; }
+  /// The terms that are not folded, with the phasor of each.
+  struct Shown {
+    std::size_t term, phasor;
+    bool operator==(const Shown&) const = default;
+  };
+  [[nodiscard]] const std::vector<Shown>& shown() const { return shown_; }
   /// The phasor of a frequency's first harmonic.
   [[nodiscard]] std::size_t first(std::size_t frequency) const { return firsts_[frequency]; }
 
  private:
   std::vector<std::size_t> terms_, lanes_, firsts_;
   std::vector<int> orders_of_terms_, orders_, last_orders_;
+  std::vector<Fold> folds_;
+  std::vector<Shown> shown_;
 };
 
 /// Adds weight · light · exp(−i 2π n f L/c), channel by channel, to the sums' terms.

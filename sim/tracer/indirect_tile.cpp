@@ -19,7 +19,7 @@ constexpr std::uint32_t kBounce = 0x10000, kPick = kBounce + 2, kRoulette = kBou
 constexpr std::uint32_t kRaysToLit = 2;
 /// Of direct light that lit places leave less than this share of, so much is left to chance that what survives has this share:
 /// away from corners that is nearly all, and what is dropped needs no ray to the emitter.
-constexpr float kLeastShare = 0.05f;
+constexpr float kLeastShare = 0.15f;
 /// Rays to a light end before its surface by this share of their way.
 constexpr float kShortOfIt = 0.002f;
 

@@ -19,9 +19,10 @@ struct Part {
 
   int x, y, width, height;
 
-  Part(const Block& block, const CameraInfo& camera)
-      : x(block.x),
-        y(block.y),
+  Part(const Block& block, const CameraInfo& camera) : Part(block.x, block.y, camera) {}
+  Part(int left, int top, const CameraInfo& camera)
+      : x(left),
+        y(top),
         width(std::min(kSize, camera.width - x)),
         height(std::min(kSize, camera.height - y)) {}
 

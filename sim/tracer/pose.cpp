@@ -106,6 +106,7 @@ Scene Scene::at(Duration time) const {
   posed->device = loaded->device;
   posed->still = loaded->still;
   posed->still_pairs = loaded->still_pairs;
+  posed->still_few = loaded->still_few;
   placeMovers(*posed, *loaded, time);
   return Scene{std::move(posed)};
 }

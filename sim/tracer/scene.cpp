@@ -246,6 +246,20 @@ struct SceneBuilder {
     }
   }
 
+  /// Still objects' triangles, if there is nothing else and they are few.
+  void takeFew(const std::vector<NumberedObject>& still) {
+    std::vector<FewTriangle> few;
+    for (const auto& [id, object] : still) {
+      if (object->triangles.empty() || object->glass != nullptr || few.size() + object->triangles.size() > kFewTriangles)
+        return;
+      for (std::uint32_t i = 0; i < object->triangles.size(); ++i) {
+        const auto& [a, b, c] = object->triangles[i];
+        few.push_back(fewTriangle(object->vertices[a], object->vertices[b], object->vertices[c], id, i));
+      }
+    }
+    scene->still_few = std::move(few);
+  }
+
   Result<> buildEmbree() {
 #if defined(__SANITIZE_THREAD__)
     scene->device = rtcNewDevice("threads=1");  // it cannot see how Embree's threads synchronise
@@ -262,6 +276,7 @@ struct SceneBuilder {
         still.push_back({static_cast<unsigned>(i), &scene->objects[i].get()});
     }
     scene->still = makeEmbreeScene(scene->device, still);
+    takeFew(still);
     for (Mover& mover : scene->movers) {
       const BuiltObject& object = scene->objects[mover.object];
       mover.embree = makeEmbreeScene(scene->device, {{static_cast<unsigned>(mover.object), &object}});

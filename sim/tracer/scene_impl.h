@@ -14,6 +14,7 @@
 #include "sim/tracer/bsdf/any.h"
 #include "sim/tracer/embree.h"
 #include "sim/tracer/environment.h"
+#include "sim/tracer/few_triangles.h"
 #include "sim/tracer/material.h"
 #include "sim/tracer/motion.h"
 #include "sim/tracer/quadric.h"
@@ -105,6 +106,7 @@ struct Scene::Impl {
 
   RTCDevice device = nullptr;
   RTCScene still = nullptr;  ///< what does not move
+  std::vector<FewTriangle> still_few;  ///< all of that, if it is so little; else empty
   std::vector<std::uint32_t> still_pairs;  ///< by object, and of nothing: 1 if its triangles are in pairs; empty if none are
 
   std::shared_ptr<const Impl> loaded;  ///< of a scene at another time: what it was made from

@@ -77,7 +77,7 @@ class Kinect {
 
  private:
   std::uint64_t seed_;
-  std::vector<Harmonic> seen_;
+  std::vector<SeenHarmonic> seen_;
 };
 
 }  // namespace toftwin::bench

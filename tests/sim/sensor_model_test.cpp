@@ -3,6 +3,7 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "sim/sensor/frame_assembly.h"
@@ -114,6 +115,49 @@ TEST(Exposing, IsCollectingAndReadingOut) {
       EXPECT_EQ(whole.range.range_m[i], halves.range.range_m[i]) << i;
     }
     EXPECT_GT(valid, 100);
+  }
+}
+
+/// The Kinect's three steps see the 5th and 7th harmonic at 16 MHz as they see the first: with both folded into it, all raw
+/// exposures collect the same charge; so do the four of the O3D303, whose 3rd is not faint.
+TEST(Exposing, CollectsTheSameOfFoldedHarmonics) {
+  for (const char* preset : {"kinect_v2", "o3d303"}) {
+    const std::string text = *SensorModel::presetText(preset);
+    const SensorModel model = modelOf(text);
+    const TraceRequest request = model.traceRequest();
+    const Light light = syntheticLight(9, 40, request.frequencies, request.harmonics, [](int x, int y) {
+      const double range_m = 0.6 + 0.07 * x + 0.11 * y;
+      return std::vector<Way>{{0.2, range_m}, {0.07, range_m + 0.4}};
+    });
+    Light folded = light, without = light;
+    int count = 0;
+    const auto terms = model.correlatedTerms();
+    const auto harmonics = static_cast<std::size_t>(request.harmonics);
+    for (std::size_t term = 0; term < terms.size(); ++term) {
+      if (!terms[term].is_folded) continue;
+      ++count;
+      auto& first = folded.phasors[term / harmonics * harmonics];
+      for (std::size_t p = 0; p < first.size(); ++p) {
+        const auto added = terms[term].beside_first * light.phasors[term][p];
+        first[p] += terms[term].is_mirrored ? std::conj(added) : added;
+      }
+      folded.phasors[term] = without.phasors[term] = {};
+    }
+    EXPECT_EQ(count, 2) << preset;
+    const Samples all = model.collect(light, {}, 1, 0), same = model.collect(folded, {}, 1, 0),
+                  less = model.collect(without, {}, 1, 0);
+    float largest = 0.0F;
+    for (std::size_t e = 0; e < all.electrons.size(); ++e) {
+      for (std::size_t p = 0; p < all.electrons[e].size(); ++p) {
+        const float charge = all.electrons[e][p];
+        ASSERT_NEAR(same.electrons[e][p], charge, 1e-6F * charge);
+        largest = std::max(largest, std::abs(less.electrons[e][p] - charge) / charge);
+      }
+    }
+    EXPECT_GT(largest, 1e-3F) << preset << ": it would have been seen";
+    // What turns harmonics each in its own way must see them apart.
+    const auto apart = modelOf(text + "[[effect]]\ntype = 'propagation_delay'\nper_column_mm = 0.1\n").correlatedTerms();
+    EXPECT_TRUE(std::ranges::none_of(apart, &SeenHarmonic::is_folded)) << preset;
   }
 }
 

@@ -359,6 +359,34 @@ TEST_F(Simulator, InRealtimeSeesWhatTheUnbiasedModeSees) {
   EXPECT_LT(meanOf("max_surfaces = 1\nmode = 'realtime'\n"), exact - 1e-2);
 }
 
+/// Frames are begun while the one before is still made, unless the client waits for each: they must be the same. A pose that is
+/// set in between counts from the next frame on.
+TEST_F(Simulator, InRealtimeFramesBegunAheadAreTheSame) {
+  std::ofstream{folder_ / "ball.toml"} << kWall << "[[object]]\nshape = 'box'\nsize_m = [0.3, 0.3, 0.3]\n"
+                                       << "position_m = [-0.3, 0, 1.5]\nmaterial = 'white'\nvelocity_m_per_s = [0.2, 0, 0]\n";
+  const auto start = [&] {
+    auto source = tryOpen("camera = 'camera.toml'\nscene = 'ball.toml'\npace = 'fast'\nmode = 'realtime'\n");
+    if (!source) throw std::runtime_error{source.error().message};
+    EXPECT_TRUE((*source)->start());
+    return *std::move(source);
+  };
+  auto ahead = start(), in_turn = start();
+  Frame last;
+  for (int i = 0; i < 30; ++i) {
+    auto frame = ahead->next({}, false);
+    ASSERT_TRUE(frame) << frame.error().message;
+    EXPECT_TRUE(sameBytes(*frame, frameOf(*in_turn))) << "frame " << i;
+    last = *std::move(frame);
+  }
+  Transform<World, Camera> pose;
+  pose.translation_m.z = -0.5;
+  ASSERT_TRUE(ahead->setPose(pose));
+  const auto moved = ahead->next({}, false);
+  ASSERT_TRUE(moved);
+  EXPECT_EQ(moved->moment.world_from_camera, pose);
+  EXPECT_NEAR(moved->find(PlaneKind::Depth)->as<float>()[0], last.find(PlaneKind::Depth)->as<float>()[0] + 0.5f, 0.05);
+}
+
 /// As above, without rows of their own times: a frame sees one time, that of raw exposure 2 of four, which begins
 /// after 3 ms.
 TEST_F(Simulator, InRealtimeThingsMoveFromFrameToFrame) {

@@ -409,7 +409,7 @@ TEST(Realtime, LeavesOutHarmonicsThatNobodyWants) {
   request.harmonics = 3;
   RealtimeTracer all, some;
   constexpr auto kSeen = Harmonic::Seen, kUnseen = Harmonic::Unseen;
-  const std::vector<Harmonic> seen{kUnseen, kUnseen, kUnseen, kSeen, kUnseen, kSeen};
+  const std::vector<SeenHarmonic> seen{kUnseen, kUnseen, kUnseen, kSeen, kUnseen, kSeen};
   for (int frame = 0; frame < 2; ++frame) {
     const Light &a = all.next(scene, request), &b = some.next(scene, request, seen);
     EXPECT_EQ(a.phasors[0], b.phasors[0]) << "the first harmonic always is";
@@ -419,7 +419,7 @@ TEST(Realtime, LeavesOutHarmonicsThatNobodyWants) {
     EXPECT_EQ(a.steady, b.steady);
   }
   // Of a faint one there is direct light alone.
-  std::vector<Harmonic> faint = seen;
+  std::vector<SeenHarmonic> faint = seen;
   faint[5] = Harmonic::Faint;
   TraceRequest direct = request;
   direct.max_surfaces = 1;
@@ -427,6 +427,68 @@ TEST(Realtime, LeavesOutHarmonicsThatNobodyWants) {
   const Light &a = one.next(scene, request, faint), &b = of_direct.next(scene, direct);
   EXPECT_EQ(a.phasors[5], b.phasors[5]);
   EXPECT_NE(a.phasors[3], b.phasors[3]);
+}
+
+/// Two overtones that three steps see as they see the first harmonic, one of them mirrored: the first holds them, direct light
+/// alone, and they have no images.
+TEST(Realtime, FoldsHarmonicsThatCannotBeToldApart) {
+  const Scene scene = sceneOf(room(0.2));
+  TraceRequest request = roomRequest();
+  request.frequencies = {16_MHz};
+  request.harmonics = 7;
+  std::vector<SeenHarmonic> seen(7, Harmonic::Unseen);
+  seen[0] = Harmonic::Seen;
+  seen[4] = seen[6] = Harmonic::Faint;
+  const std::vector<SeenHarmonic> apart = seen;
+  const std::complex<float> of_fifth{0.02f, -0.03f}, of_seventh{-0.04f, 0.01f};
+  seen[4].is_folded = seen[4].is_mirrored = seen[6].is_folded = true;
+  seen[4].beside_first = of_fifth;
+  seen[6].beside_first = of_seventh;
+  for (const int surfaces : {1, 16}) {
+    request.max_surfaces = surfaces;
+    RealtimeTracer folding, telling;
+    for (int frame = 0; frame < 3; ++frame) {
+      const Light &a = folding.next(scene, request, seen), &b = telling.next(scene, request, apart);
+      ASSERT_TRUE(a.phasors[4].empty() && a.phasors[6].empty());
+      float apart_by = 0.0f;
+      for (std::size_t p = 0; p < a.steady.size(); ++p) {
+        const auto expected = b.phasors[0][p] + std::conj(of_fifth * b.phasors[4][p]) + of_seventh * b.phasors[6][p];
+        ASSERT_LE(std::abs(a.phasors[0][p] - expected), 1e-6f * a.steady[p]);
+        apart_by = std::max(apart_by, std::abs(a.phasors[0][p] - b.phasors[0][p]) / (a.steady[p] + 1e-9f));
+      }
+      EXPECT_GT(apart_by, 0.01f);
+    }
+  }
+}
+
+/// While a frame is begun, the last one's light stays as it is; what comes of it is what next() gives. A frame that is begun
+/// and then not wanted counts as one more, here where nothing is looked at again for its footprint.
+TEST(Realtime, IsTheSameBegunAhead) {
+  const Scene moving = sceneOf(room(0.0, "velocity_m_per_s = [0.9, 0.4, -0.5]"));
+  TraceRequest request = roomRequest();
+  for (const double extent : {1.0, 0.0}) {
+    request.pixel_extent = extent;
+    RealtimeTracer ahead, in_turn;
+    for (int frame = 0; frame < 4; ++frame) {
+      const Scene scene = moving.at(frame * 33.3_ms);
+      const Light& light = frame == 0 ? ahead.next(scene, request) : ahead.finish();
+      const Light& expected = in_turn.next(scene, request);
+      if (extent == 0.0 && frame == 2) {
+        ahead.begin(moving.at(500_ms), request);
+        in_turn.next(moving.at(500_ms), request);
+      }
+      const Light before = light;
+      ahead.begin(moving.at((frame + 1) * 33.3_ms), request);
+      ASSERT_EQ(light.phasors, before.phasors) << frame;
+      ASSERT_EQ(light.truth.range_m, before.truth.range_m) << frame;
+      if (extent == 0.0 && frame == 2) continue;
+      ASSERT_EQ(light.phasors, expected.phasors) << frame;
+      ASSERT_EQ(light.variance, expected.variance) << frame;
+      ASSERT_EQ(light.truth.range_m, expected.truth.range_m) << frame;
+      ASSERT_EQ(light.truth.normal, expected.truth.normal) << frame;
+    }
+  }
+  EXPECT_THROW(RealtimeTracer{}.finish(), std::logic_error);
 }
 
 /// Special surfaces show their own direct light.
@@ -448,7 +510,7 @@ TEST(Realtime, ShowsSpecialSurfacesInDirectLight) {
 TEST(Realtime, RefusesWhatItCannotDo) {
   const Scene scene = sceneOf(room(0.2));
   const auto problemOf = [&](const std::function<void(TraceRequest&)>& change,
-                             const std::vector<Harmonic>& seen = {}) {
+                             const std::vector<SeenHarmonic>& seen = {}) {
     TraceRequest request = roomRequest();
     change(request);
     try {

@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/tracer/few_triangles.h"
+
+#include <algorithm>
+#include <limits>
+#include <random>
+
+#include "sim/tracer/lanes.h"
+#include "sim/tracer/scene_impl.h"
+#include "tests/tracer/tracing.h"
+
+namespace toftwin::sim::testing {
+namespace {
+
+/// Two boxes in a room: 36 triangles would be too many, so that one of them is two rectangles.
+constexpr auto kRoom = R"(
+[[material]]
+name = "m"
+albedo = 0.5
+[[object]]
+shape = "box"
+size_m = [4, 2.5, 5]
+position_m = [0, 0, 2]
+euler_deg = [3, 17, 5]
+material = "m"
+[[object]]
+shape = "box"
+size_m = [0.5, 0.7, 0.4]
+position_m = [0.3, -0.2, 1.8]
+euler_deg = [31, 7, 11]
+material = "m"
+[[object]]
+shape = "rectangle"
+size_m = [0.8, 0.6, 0]
+position_m = [-0.6, 0.4, 2.4]
+euler_deg = [20, 40, 0]
+material = "m"
+)";
+
+using Draw = std::mt19937;
+
+Vec3d pointIn(Draw& draw, double half) {
+  std::uniform_real_distribution<double> along{-half, half};
+  const double x = along(draw), y = along(draw);
+  return {x, y, along(draw)};
+}
+
+/// Sixteen rays from points to others, and beyond them as far as `reach` times.
+RTCRayHit16 raysBetween(const std::array<Vec3d, kLaneCount>& from, const std::array<Vec3d, kLaneCount>& to, double reach) {
+  RTCRayHit16 rays{};
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const Vec3d way = to[i] - from[i], d = way / norm(way);
+    rays.ray.org_x[i] = static_cast<float>(from[i].x);
+    rays.ray.org_y[i] = static_cast<float>(from[i].y);
+    rays.ray.org_z[i] = static_cast<float>(from[i].z);
+    rays.ray.dir_x[i] = static_cast<float>(d.x);
+    rays.ray.dir_y[i] = static_cast<float>(d.y);
+    rays.ray.dir_z[i] = static_cast<float>(d.z);
+    rays.ray.tfar[i] = static_cast<float>(reach * norm(way));
+    rays.ray.mask[i] = 0xffffffffu;
+    rays.hit.geomID[i] = rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
+  }
+  return rays;
+}
+
+Scene parsed(const std::string& text) {
+  auto scene = Scene::parse(text, "scene.toml");
+  if (!scene) throw std::runtime_error{scene.error().message};
+  return *std::move(scene);
+}
+
+TEST(FewTriangles, AreThoseOfScenesThatHaveNoMore) {
+  EXPECT_EQ(parsed(kRoom).impl().still_few.size(), 26u);
+  const std::string box = "[[object]]\nshape = 'box'\nsize_m = [1, 1, 1]\nposition_m = [0, 0, 4]\nmaterial = 'm'\n";
+  EXPECT_TRUE(parsed(kRoom + box).impl().still_few.empty()) << "38";
+  EXPECT_EQ(parsed(kRoom + box + "velocity_m_per_s = [1, 0, 0]\n").at(1_s).impl().still_few.size(), 26u)
+      << "what moves is not among them";
+  const std::string sphere = "[[object]]\nshape = 'sphere'\nradius_m = 0.2\nposition_m = [0, 0, 3]\nmaterial = 'm'\n";
+  EXPECT_TRUE(parsed(kRoom + sphere).impl().still_few.empty());
+}
+
+/// Rays that start and end anywhere in the room, some of which do not count: what Embree says, but within 1e-5 of an edge or
+/// of a ray's ends.
+TEST(FewTriangles, AreMetWhereEmbreeMeetsThem) {
+  const Scene scene = parsed(kRoom);
+  const Scene::Impl& impl = scene.impl();
+  constexpr unsigned kSeed = 20261128;
+  Draw draw{kSeed};
+  int met = 0, blocked = 0;
+  for (int packet = 0; packet < 4000; ++packet) {
+    std::array<Vec3d, kLaneCount> from, to;
+    for (std::size_t i = 0; i < kLaneCount; ++i) from[i] = pointIn(draw, 1.2), to[i] = pointIn(draw, 2.5);
+    const RTCRayHit16 rays = raysBetween(from, to, packet % 2 == 0 ? 1.0 : 10.0);
+    Lanes<int> valid;
+    for (std::size_t i = 0; i < kLaneCount; ++i) valid[i] = draw() % 8 == 0 ? 0 : -1;
+    RTCRayHit16 ours = rays, embrees = rays;
+    intersectFew(impl.still_few, valid.v, ours);
+    embree::intersect(valid.v, impl.still, embrees, false);
+    RTCRay16 our_shadows = rays.ray, embree_shadows = rays.ray;
+    occludedFew(impl.still_few, valid.v, our_shadows);
+    embree::occluded(valid.v, impl.still, embree_shadows, false);
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      if (valid[i] == 0) {
+        ASSERT_EQ(ours.ray.tfar[i], rays.ray.tfar[i]);
+        ASSERT_EQ(our_shadows.tfar[i], rays.ray.tfar[i]);
+        ASSERT_EQ(ours.hit.geomID[i], RTC_INVALID_GEOMETRY_ID);
+        continue;
+      }
+      const float u = embrees.hit.u[i], v = embrees.hit.v[i];
+      const bool is_at_edge = std::min({u, v, 1.0f - u - v}) < 1e-5f;
+      const bool is_at_end = embrees.ray.tfar[i] < 1e-5f || embrees.ray.tfar[i] > (1.0f - 1e-5f) * rays.ray.tfar[i];
+      const bool is_met = embrees.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+      met += is_met ? 1 : 0;
+      ASSERT_NEAR(ours.ray.tfar[i], embrees.ray.tfar[i], 1e-5f * embrees.ray.tfar[i] + 1e-6f) << packet << ", " << i;
+      if ((is_met && is_at_edge) || (is_at_end && is_met)) continue;
+      ASSERT_EQ(ours.hit.geomID[i], embrees.hit.geomID[i]) << packet << ", " << i;
+      if (is_met) {
+        ASSERT_EQ(ours.hit.primID[i], embrees.hit.primID[i]);
+        ASSERT_NEAR(ours.hit.u[i], u, 1e-4);
+        ASSERT_NEAR(ours.hit.v[i], v, 1e-4);
+      }
+      ASSERT_EQ(our_shadows.tfar[i] < 0.0f, is_met);
+      ASSERT_EQ(embree_shadows.tfar[i] < 0.0f, is_met);
+      blocked += our_shadows.tfar[i] < 0.0f ? 1 : 0;
+    }
+  }
+  EXPECT_GT(met, 30'000);
+  EXPECT_GT(blocked, 30'000);
+}
+
+/// From within a box, at points on its edges and on its faces' diagonals: no ray gets out between two triangles.
+TEST(FewTriangles, LetNothingThroughTheirEdges) {
+  const Scene scene = parsed(std::string{kRoom}.substr(0, std::string{kRoom}.find("[[object]]\nshape = \"box\"\nsize_m = [0.5")));
+  const Scene::Impl& impl = scene.impl();
+  ASSERT_EQ(impl.still_few.size(), 12u);
+  constexpr unsigned kSeed = 7;
+  Draw draw{kSeed};
+  std::uniform_real_distribution<float> share{0.0f, 1.0f};
+  Lanes<int> valid;
+  std::fill_n(valid.v, kLaneCount, -1);
+  for (int packet = 0; packet < 20'000; ++packet) {
+    std::array<Vec3d, kLaneCount> from, to;
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      const FewTriangle& t = impl.still_few[draw() % 12];
+      const Vec3f ends[] = {t.a, t.b, t.c};
+      const std::size_t first = draw() % 3;
+      const Vec3f p = ends[first], q = ends[(first + 1) % 3];
+      const float s = share(draw);
+      const Vec3f at = p + (q - p) * s;
+      from[i] = pointIn(draw, 1.0);
+      to[i] = {static_cast<double>(at.x), static_cast<double>(at.y), static_cast<double>(at.z)};
+    }
+    RTCRayHit16 rays = raysBetween(from, to, 100.0);
+    RTCRay16 shadows = rays.ray;
+    intersectFew(impl.still_few, valid.v, rays);
+    occludedFew(impl.still_few, valid.v, shadows);
+    for (std::size_t i = 0; i < kLaneCount; ++i) {
+      ASSERT_NE(rays.hit.geomID[i], RTC_INVALID_GEOMETRY_ID) << packet << ", " << i;
+      ASSERT_LT(shadows.tfar[i], 0.0f);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace toftwin::sim::testing
