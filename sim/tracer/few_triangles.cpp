@@ -102,8 +102,8 @@ void occludedFew(const std::vector<FewTriangle>& triangles, const int* valid, RT
     Lanes<float> distance;
     if (!crossPlane(t, rays, far, distance)) continue;
     for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const bool is_between = (distance[i] >= rays.tnear[i]) & (distance[i] <= far[i]);
-      is_met[i] |= is_between ? sharesOf(t, rays, i).is_inside : 0;
+      const int is_between = (distance[i] >= rays.tnear[i]) & (distance[i] <= far[i]) ? 1 : 0;
+      is_met[i] |= is_between & sharesOf(t, rays, i).is_inside;
     }
   }
   constexpr float kMet = -std::numeric_limits<float>::infinity();

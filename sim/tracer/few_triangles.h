@@ -21,7 +21,7 @@ struct FewTriangle {
 
 FewTriangle fewTriangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, std::uint32_t object, std::uint32_t number);
 
-/// So few. Each costs sixteen rays that go anywhere a sixtieth of what Embree takes for them in a small tree.
+/// So few: with as many, rays that go anywhere take two thirds of the time that Embree takes, coherent ones as long.
 inline constexpr std::size_t kFewTriangles = 32;
 
 /// Closest hits, and shadow rays, of the rays whose `valid` is -1, as embree::intersect() and occluded() give them; they change

@@ -12,7 +12,7 @@
 namespace toftwin::sim::testing {
 namespace {
 
-/// Two boxes in a room: 36 triangles would be too many, so that one of them is two rectangles.
+/// A room, a box in it and a rectangle: 26 triangles.
 constexpr auto kRoom = R"(
 [[material]]
 name = "m"
@@ -157,6 +157,35 @@ TEST(FewTriangles, LetNothingThroughTheirEdges) {
     for (std::size_t i = 0; i < kLaneCount; ++i) {
       ASSERT_NE(rays.hit.geomID[i], RTC_INVALID_GEOMETRY_ID) << packet << ", " << i;
       ASSERT_LT(shadows.tfar[i], 0.0f);
+    }
+  }
+}
+
+/// The same exactly along edges, diagonals and through corners, where nothing is rounded: from the middle of a cube at the
+/// places of a grid on its faces.
+TEST(FewTriangles, LetNothingThroughExactlyOnTheirEdges) {
+  const Scene scene = parsed(
+      "[[material]]\nname = 'm'\nalbedo = 0.5\n[[object]]\nshape = 'box'\nsize_m = [2, 2, 2]\nmaterial = 'm'\n");
+  const Scene::Impl& impl = scene.impl();
+  ASSERT_EQ(impl.still_few.size(), 12u);
+  Lanes<int> valid;
+  std::fill_n(valid.v, kLaneCount, -1);
+  for (int place = 0; place < 6 * 17; ++place) {
+    const int face = place / 17, row = place % 17 - 8;
+    for (int half = 0; half < 2; ++half) {
+      std::array<Vec3d, kLaneCount> from{}, to;
+      for (std::size_t i = 0; i < kLaneCount; ++i) {
+        const double a = std::min(static_cast<int>(i) + half, 16) / 8.0 - 1.0, b = row / 8.0, c = face % 2 == 0 ? -1.0 : 1.0;
+        to[i] = face / 2 == 0 ? Vec3d{a, b, c} : face / 2 == 1 ? Vec3d{b, c, a} : Vec3d{c, a, b};
+      }
+      RTCRayHit16 rays = raysBetween(from, to, 2.0);
+      for (std::size_t i = 0; i < kLaneCount; ++i) {
+        rays.ray.dir_x[i] = static_cast<float>(to[i].x);  // not of length 1, and so not rounded
+        rays.ray.dir_y[i] = static_cast<float>(to[i].y);
+        rays.ray.dir_z[i] = static_cast<float>(to[i].z);
+      }
+      intersectFew(impl.still_few, valid.v, rays);
+      for (std::size_t i = 0; i < kLaneCount; ++i) ASSERT_EQ(rays.ray.tfar[i], 1.0f) << face << ", " << row << ", " << i;
     }
   }
 }
