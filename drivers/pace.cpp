@@ -35,6 +35,9 @@ ClockRelation relateToHost(DeviceTime device, SteadyTime at) {
 
 namespace {
 
+/// A chosen frame that is so late is of no use to anybody.
+constexpr std::chrono::seconds kStale{1};
+
 std::int64_t nanosecondsOf(Duration frame_interval) {
   return std::max<std::int64_t>(1, std::llround(frame_interval.in(nanosecond)));
 }
@@ -53,18 +56,25 @@ void Pacer::setPace(Pace pace) {
   pace_ = pace;
   since_.reset();  // what was not paced is not caught up with
   triggers_ = 0;
+  forgetChosen();
 }
 
-nanoseconds Pacer::lateness(std::uint64_t index) const {
-  return duration_cast<nanoseconds>(std::chrono::steady_clock::now() - *since_) - nanoseconds{deviceTimeOf(index).ns};
+void Pacer::forgetChosen() {
+  next_.reset();
+  is_chosen_ = false;
+  lost_ = 0;
 }
 
-std::uint64_t Pacer::turnsLost(std::uint64_t index) const {
-  return static_cast<std::uint64_t>(std::max<std::int64_t>(0, lateness(index).count() / interval_ns_));
+nanoseconds Pacer::lateness(std::uint64_t index, SteadyTime now) const {
+  return duration_cast<nanoseconds>(now - *since_) - nanoseconds{deviceTimeOf(index).ns};
+}
+
+std::uint64_t Pacer::turnsLost(std::uint64_t index, SteadyTime now) const {
+  return static_cast<std::uint64_t>(std::max<std::int64_t>(0, lateness(index, now).count() / interval_ns_));
 }
 
 DeviceTime Pacer::chooseNext() {
-  lost_ = since_ ? turnsLost(index_ + 1) : 0;
+  lost_ = since_ ? turnsLost(index_ + 1, std::chrono::steady_clock::now()) : 0;
   next_ = index_ + 1 + lost_;
   return deviceTimeOf(*next_);
 }
@@ -78,6 +88,7 @@ void Pacer::advance() {
 void Pacer::restart() {
   since_.reset();
   triggers_ = 0;
+  forgetChosen();
 }
 
 Result<std::uint64_t> Pacer::waitForTurn(const std::stop_token& stop, bool lockstep) {
@@ -98,10 +109,10 @@ Result<std::uint64_t> Pacer::waitForTurn(const std::stop_token& stop, bool locks
     since_ = now - nanoseconds{deviceTime().ns};
     clock_ = relateToHost(deviceTime(), now);
   }
-  const nanoseconds late = lateness(index_);
+  const nanoseconds late = lateness(index_, now);
   if (late > nanoseconds{0}) {
-    if (!is_chosen_ || late > kLongestWait) {
-      const std::uint64_t lost = turnsLost(index_);
+    if (!is_chosen_ || late > kStale) {
+      const std::uint64_t lost = turnsLost(index_, now);
       index_ += lost;
       lost_ += lost;
     }

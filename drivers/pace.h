@@ -45,8 +45,9 @@ class Pacer {
   /// all (Fast, lockstep). Gives how many frames were due meanwhile and are lost, as a camera would have
   /// lost them; they are counted already. Errors: Stopped, Timeout.
   Result<std::uint64_t> waitForTurn(const std::stop_token& stop, bool lockstep);
-  /// Chooses the next frame's turn already now, while the present one is made: turns that are due by now are lost but for
-  /// the last. waitForTurn() will say so, and count others only if the frame is a second late. Gives its device time.
+  /// Chooses the next frame's turn already now, while the present one is made: turns that are due by now are lost but
+  /// for the last. waitForTurn() will say so, and count others only if the frame is a second late. Gives its device
+  /// time.
   DeviceTime chooseNext();
   /// The frame was made.
   void advance();
@@ -66,9 +67,10 @@ class Pacer {
     return {base_ns_ + static_cast<std::int64_t>(index - base_index_) * interval_ns_};
   }
   /// In real time: since it was due; negative before.
-  [[nodiscard]] std::chrono::nanoseconds lateness(std::uint64_t index) const;
-  /// How many turns after it are due by now.
-  [[nodiscard]] std::uint64_t turnsLost(std::uint64_t index) const;
+  [[nodiscard]] std::chrono::nanoseconds lateness(std::uint64_t index, SteadyTime now) const;
+  /// How many turns after it are due by then.
+  [[nodiscard]] std::uint64_t turnsLost(std::uint64_t index, SteadyTime now) const;
+  void forgetChosen();
   /// Begins the present frame. How many were lost before it.
   std::uint64_t takeTurn();
 

@@ -95,6 +95,7 @@ class SimulatedSource final : public Source {
     last_collected_.reset();
     last_range_.reset();
     filters_.forget();
+    frames_as_they_are_ = 0;
     return {};
   }
   void stop() override {}
@@ -122,8 +123,7 @@ class SimulatedSource final : public Source {
     frame.provenance = sim::provenanceOf(model_, view_.scene().id(), keys_.seed);
     operating_.note(frame.provenance);
     frame.camera = info_.camera;
-    const bool is_last = made_ + 1 == keys_.frames;
-    if (view_.isRealtime() && !lockstep && !is_last && !info_.can_trigger && ++frames_at_pose_ > kLongAtPose) {
+    if (isNextBegunAhead(lockstep)) {
       const Duration next = sim::middleOf(momentAt(pacer_.chooseNext()));
       sim::together([&] { frame.planes = expose(frame.moment); }, [&] { view_.beginFrame(next); });
     } else {
@@ -162,7 +162,7 @@ class SimulatedSource final : public Source {
     }
     if (world_from_camera == view_.pose()) return {};
     view_.setPose(world_from_camera);
-    frames_at_pose_ = 0;
+    frames_as_they_are_ = 0;
     collected_.reset();
     return {};
   }
@@ -235,6 +235,7 @@ class SimulatedSource final : public Source {
                          model_.hasPhasors() ? model_.correlatedTerms() : std::vector<sim::SeenHarmonic>{});
     info_.planes = planesNow();
     collected_.reset();
+    frames_as_they_are_ = 0;
     return {};
   }
 
@@ -266,6 +267,15 @@ class SimulatedSource final : public Source {
     if (!color_) return true;
     const Duration middle = sim::middleOf(momentOfFrame());
     return color_->complete(view_.poseAt(middle), middle, view_.changesWithTime() ? pacer_.index() : 0, stop);
+  }
+
+  /// In real time a frame's light is begun while the one before is still exposed, once pose and exposures have stayed for a
+  /// while: what is set after that makes it of no use.
+  bool isNextBegunAhead(bool lockstep) {
+    constexpr int kLong = 15;
+    if (!view_.worksAhead() || lockstep || info_.can_trigger || made_ + 1 == keys_.frames) return false;
+    frames_as_they_are_ = std::min(frames_as_they_are_ + 1, kLong + 1);
+    return frames_as_they_are_ > kLong;
   }
 
   /// One light for all raw exposures, of the time of the middle one.
@@ -375,10 +385,7 @@ class SimulatedSource final : public Source {
   std::optional<sim::RangeImage> last_range_;
   Pacer pacer_;  ///< its frame index keys the noise
   std::uint64_t made_ = 0;  ///< since start()
-  /// In real time a frame's light is begun while the one before is still exposed, once the pose has stayed for a while: a pose
-  /// that is set after that would make it of no use.
-  static constexpr int kLongAtPose = 15;
-  int frames_at_pose_ = 0;
+  int frames_as_they_are_ = 0;  ///< since pose, exposures or anything else of the model were set
   Duration since_power_on_;  ///< at device time 0
   Temperature room_temperature_;
   Illuminance ambient_;

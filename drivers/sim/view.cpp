@@ -29,11 +29,7 @@ void View::setPose(const Transform<World, Camera>& world_from_camera) {
 }
 
 void View::setFrequencies(std::vector<Frequency> frequencies, std::vector<sim::SeenHarmonic> seen) {
-  if (realtime_ && frequencies == request_.frequencies && seen != seen_) {
-    seen_ = std::move(seen);
-    begun_.reset();
-  }
-  if (frequencies == request_.frequencies) return;
+  if (frequencies == request_.frequencies && (!realtime_ || seen == seen_)) return;
   request_.frequencies = std::move(frequencies);
   own_ = {};
   foreign_.assign(foreign_.size(), {});
@@ -63,14 +59,14 @@ sim::TraceRequest View::requestAt(Duration time) const {
 }
 
 void View::traceFrame(Duration time) {
-  const bool is_begun = begun_ == Begun{time, poseAt(time)};
+  const bool is_begun = begun_ == begunAt(time);
   realtime_light_ = is_begun ? &realtime_->finish() : &realtime_->next(sceneAt(time), requestAt(time), seen_);
   begun_.reset();
 }
 
 void View::beginFrame(Duration time) {
   realtime_->begin(sceneAt(time), requestAt(time), seen_);
-  begun_ = {time, poseAt(time)};
+  begun_ = begunAt(time);
 }
 
 bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const {

@@ -55,6 +55,8 @@ class View {
   [[nodiscard]] bool isRealtime() const { return realtime_.has_value(); }
   /// Traces the light of one frame, as it is at a time since device time 0.
   void traceFrame(Duration time);
+  /// Whether beginFrame() saves any time.
+  [[nodiscard]] bool worksAhead() const { return realtime_ && sim::RealtimeTracer::worksAhead(scene_, request_); }
   /// Begins what traceFrame() will be asked for unless the pose changes; meanwhile others may read light().
   void beginFrame(Duration time);
   /// The same with what other cameras add to a raw exposure.
@@ -85,6 +87,8 @@ class View {
     Transform<World, Camera> pose;
     bool operator==(const Begun&) const = default;
   };
+  /// Where nothing moves any time will do.
+  [[nodiscard]] Begun begunAt(Duration time) const { return {moves() ? time : Duration{}, poseAt(time)}; }
   std::optional<Begun> begun_;  ///< by beginFrame()
   const sim::Light* realtime_light_ = nullptr;      ///< the tracer's
   Pass own_;

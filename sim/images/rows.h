@@ -8,6 +8,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <exception>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -36,15 +37,33 @@ void inFewParts(int count, int least, const Work& work) {
   inParallel(count, std::max(least, count / (kPartsOfThread * tbb::this_task_arena::max_concurrency())), work);
 }
 
-/// Does both, at the same time as far as there are threads.
+/// Does both, at the same time as far as there are threads. Both come to their end, whether the other throws or not (the TBB
+/// library would have the other's parallel work return early, as if it was done); then the first one's problem is thrown.
 template <class First, class Second>
 void together(const First& first, const Second& second) {
+  std::exception_ptr problem_of_first, problem_of_second;
+  const auto doFirst = [&] {
+    try {
+      first();
+    } catch (...) {
+      problem_of_first = std::current_exception();
+    }
+  };
+  const auto doSecond = [&] {
+    try {
+      second();
+    } catch (...) {
+      problem_of_second = std::current_exception();
+    }
+  };
 #if defined(__SANITIZE_THREAD__)
-  first();
-  second();
+  doFirst();
+  doSecond();
 #else
-  tbb::parallel_invoke(first, second);
+  tbb::parallel_invoke(doFirst, doSecond);
 #endif
+  if (problem_of_first) std::rethrow_exception(problem_of_first);
+  if (problem_of_second) std::rethrow_exception(problem_of_second);
 }
 
 /// What parts of parallel work write into, taken up by another part when one has ended: no more of them are made than

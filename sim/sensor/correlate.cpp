@@ -101,7 +101,8 @@ std::vector<SeenHarmonic> foldedTerms(const std::vector<Response>& responses, in
     const auto& contents = responses[term / static_cast<std::size_t>(harmonics)].harmonics;
     harmonic.is_folded = true;
     harmonic.is_mirrored = is_mirrored;
-    harmonic.beside_first = std::complex<float>{contents[i] / contents[0]};
+    harmonic.beside_first =
+        std::complex<float>{contents[i] / (is_mirrored ? std::conj(contents[0]) : contents[0])};
   }
   return seen;
 }

@@ -34,7 +34,8 @@ std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
 /// How correlate() sees the light's phasors, in their order, by what the responses hold of them.
 std::vector<Harmonic> correlatedTerms(const std::vector<Response>& responses, int harmonics);
 /// The same, with the faint ones folded that so many steps see as they see the first: n = ±1 modulo the steps, where
-/// exp(i n θₖ) = exp(±i θₖ). Right as long as nothing turns harmonics or shifts steps between the light and its correlation.
+/// exp(i n θₖ) = exp(±i θₖ). Right as long as nothing turns harmonics or shifts steps between the light and its
+/// correlation.
 std::vector<SeenHarmonic> foldedTerms(const std::vector<Response>& responses, int harmonics, int steps);
 
 /// A copy of the light to be changed by effects, without what correlate() would not look at: harmonics that
@@ -42,7 +43,6 @@ std::vector<SeenHarmonic> foldedTerms(const std::vector<Response>& responses, in
 Light correlatedPart(const Light& light, const std::vector<Response>& responses, bool all_harmonics);
 
 /// Collects a raw exposure's charge, noise-free: at step k, θₖ = 2πk/steps,
-///     tap 0, 1 = g/2 · ( L + A ± m Re Σₙ ĉₙ Pₙ e^(i n θₖ) )
 /// with the light's phasors Pₙ, its own unmodulated radiance L, the ambient radiance A, and g
 /// electrons per radiance. The light's modulation error adds to ĉₙ and θₖ. Wiggling is born here:
 /// harmonics that the steps cannot tell from the fundamental. The light has the responses' frequencies in

@@ -8,22 +8,23 @@
 namespace toftwin::sim {
 namespace {
 
-/// d · ((p − q) × (p + q)), twice the volume that a ray's direction and an edge span. From the triangle on its other side,
-/// which goes along it the other way, it is the same number with the other sign, however it is rounded.
+/// d · ((p − q) × (p + q)), twice the volume that a ray's direction and an edge span. From the triangle on its other
+/// side, which goes along it the other way, it is the same number with the other sign, however it is rounded.
 TOFTWIN_INLINE float beside(float dx, float dy, float dz, float px, float py, float pz, float qx, float qy, float qz) {
   const float ex = px - qx, ey = py - qy, ez = pz - qz, sx = px + qx, sy = py + qy, sz = pz + qz;
   return (ey * sz - ez * sy) * dx + (ez * sx - ex * sz) * dy + (ex * sy - ey * sx) * dz;
 }
 
 /// Where rays cross the triangle's plane; false if none does between its ends.
-TOFTWIN_INLINE bool crossPlane(const FewTriangle& t, const RTCRay16& rays, const Lanes<float>& far, Lanes<float>& distance) {
+TOFTWIN_INLINE bool crossPlane(const FewTriangle& t, const RTCRay16& rays, const Lanes<float>& far,
+                               Lanes<float>& distance) {
   int any = 0;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const float ax = t.a.x - rays.org_x[i], ay = t.a.y - rays.org_y[i], az = t.a.z - rays.org_z[i];
     const float d = (ax * t.normal.x + ay * t.normal.y + az * t.normal.z) /
                     (rays.dir_x[i] * t.normal.x + rays.dir_y[i] * t.normal.y + rays.dir_z[i] * t.normal.z);
     distance[i] = d;
-    any |= (d >= rays.tnear[i]) & (d <= far[i]) ? 1 : 0;  // not NaN: along the plane
+    any |= (d > rays.tnear[i]) & (d <= far[i]) ? 1 : 0;  // not NaN: along the plane
   }
   return any != 0;
 }
@@ -74,7 +75,7 @@ void intersectFew(const std::vector<FewTriangle>& triangles, const int* valid, R
     if (!crossPlane(t, rays.ray, far, distance)) continue;
     for (std::size_t i = 0; i < kLaneCount; ++i) {
       const Shares shares = sharesOf(t, rays.ray, i);
-      const bool is_met = (shares.is_inside != 0) & (distance[i] >= rays.ray.tnear[i]) & (distance[i] <= far[i]);
+      const bool is_met = (shares.is_inside != 0) & (distance[i] > rays.ray.tnear[i]) & (distance[i] <= far[i]);
       far[i] = is_met ? distance[i] : far[i];
       u[i] = is_met ? shares.of_b : u[i];
       v[i] = is_met ? shares.of_c : v[i];
@@ -102,7 +103,7 @@ void occludedFew(const std::vector<FewTriangle>& triangles, const int* valid, RT
     Lanes<float> distance;
     if (!crossPlane(t, rays, far, distance)) continue;
     for (std::size_t i = 0; i < kLaneCount; ++i) {
-      const int is_between = (distance[i] >= rays.tnear[i]) & (distance[i] <= far[i]) ? 1 : 0;
+      const int is_between = (distance[i] > rays.tnear[i]) & (distance[i] <= far[i]) ? 1 : 0;
       is_met[i] |= is_between & sharesOf(t, rays, i).is_inside;
     }
   }

@@ -11,8 +11,8 @@
 
 namespace toftwin::sim {
 
-/// A triangle among so few that sixteen rays are tested with all of them sooner than a tree is gone down: rooms that are
-/// boxes, walls, tables. Numbers and corners as Embree would have them.
+/// A triangle among so few that sixteen rays are tested with all of them sooner than a tree is gone down: rooms that
+/// are boxes, walls, tables. Numbers and corners as Embree would have them.
 struct FewTriangle {
   Vec3f a, b, c;
   Vec3f normal;  ///< of any length
@@ -21,11 +21,11 @@ struct FewTriangle {
 
 FewTriangle fewTriangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, std::uint32_t object, std::uint32_t number);
 
-/// So few: with as many, rays that go anywhere take two thirds of the time that Embree takes, coherent ones as long.
+/// So few: with as many, rays that go anywhere take two thirds of the time that Embree takes.
 inline constexpr std::size_t kFewTriangles = 32;
 
-/// Closest hits, and shadow rays, of the rays whose `valid` is -1, as embree::intersect() and occluded() give them; they change
-/// nothing for rays that meet none. Along the edges of a mesh a ray meets one of the two triangles.
+/// Closest hits, and shadow rays, of the rays whose `valid` is -1, as embree::intersect() and occluded() give them;
+/// they change nothing for rays that meet none. Along the edges of a mesh a ray meets one of the two triangles.
 void intersectFew(const std::vector<FewTriangle>& triangles, const int* valid, RTCRayHit16& rays);
 void occludedFew(const std::vector<FewTriangle>& triangles, const int* valid, RTCRay16& rays);
 

@@ -79,7 +79,8 @@ struct RealtimeTracer::Impl {
   std::vector<BlockGeometry> geometry;
   KeptDirect kept;
   std::uint32_t frame = 0;  ///< of those with light over several surfaces
-  std::vector<std::vector<TruthOfBlock>> truths;  ///< of blocks traced since the images were written, in the order of frames
+  /// Of blocks traced since the images were written, in the order of frames.
+  std::vector<std::vector<TruthOfBlock>> truths;
   std::mutex truths_mutex;
 
   template <class Work>
@@ -181,7 +182,8 @@ void RealtimeTracer::Impl::refineJumps(const Scene& scene, const TraceRequest& r
   const auto samples = std::bit_floor(share), per_packet = static_cast<unsigned>(kLaneCount) / samples;
   const TraceRequest what = directOnly(request, static_cast<int>(samples));
   const Tracing tracing{scene.impl(), what, nullptr, images.channels().orders(), images.channels().lastOrders()};
-  const int first_sample = static_cast<int>(turn % kTurns * samples), last_sample = first_sample + what.samples_per_pixel;
+  const int first_sample = static_cast<int>(turn % kTurns * samples);
+  const int last_sample = first_sample + what.samples_per_pixel;
   recallBlocksOf(pixels, tracing);
   inParallel((count + static_cast<int>(per_packet) - 1) / static_cast<int>(per_packet), 16, [&](int begin, int end) {
     const FlushDenormals flush;
@@ -251,7 +253,8 @@ void RealtimeTracer::Impl::addIndirect(const Tracing& of_direct, const Tracing& 
   });
 }
 
-void RealtimeTracer::Impl::prepare(const Scene& scene, const TraceRequest& request, std::span<const SeenHarmonic> seen) {
+void RealtimeTracer::Impl::prepare(const Scene& scene, const TraceRequest& request,
+                                   std::span<const SeenHarmonic> seen) {
   checkRequest(request);
   const auto require = [](bool is_met, const char* what) {
     if (!is_met) throw std::invalid_argument{fmt::format("trace: {}", what)};
@@ -260,6 +263,8 @@ void RealtimeTracer::Impl::prepare(const Scene& scene, const TraceRequest& reque
   require(request.gates.empty(), "gates need mode unbiased: their light cannot be kept from frame to frame");
   require(seen.empty() || seen.size() == request.frequencies.size() * static_cast<std::size_t>(request.harmonics),
           "seen must name every frequency's harmonics");
+  require(std::ranges::none_of(seen, [](const SeenHarmonic& one) { return one.is_folded && one.how != Harmonic::Faint; }),
+          "of seen, only faint harmonics can be folded");
   begun.emplace(scene, request, Channels{request, seen}, Channels{request, seen, Harmonic::Seen}, false);
 }
 
@@ -309,10 +314,14 @@ RealtimeTracer::~RealtimeTracer() = default;
 
 void RealtimeTracer::begin(const Scene& scene, const TraceRequest& request, std::span<const SeenHarmonic> seen) {
   impl_->prepare(scene, request, seen);
-  // Direct light alone is left in the images from frame to frame; that of special surfaces is kept nowhere else.
-  if (request.max_surfaces == 1 || !scene.impl().is_matt) return;
+  if (!worksAhead(scene, request)) return;
   impl_->gather(true);
   impl_->begun->is_gathered = true;
+}
+
+bool RealtimeTracer::worksAhead(const Scene& scene, const TraceRequest& request) {
+  // Direct light alone is left in the images from frame to frame; that of special surfaces is kept nowhere else.
+  return request.max_surfaces != 1 && scene.impl().is_matt;
 }
 
 const Light& RealtimeTracer::finish() {

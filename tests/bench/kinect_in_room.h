@@ -39,7 +39,7 @@ class Files {
   std::filesystem::path folder_;
 };
 
-/// The camera frame after frame, as the driver runs it.
+/// The camera frame after frame, as the driver runs it but that it begins frames ahead.
 class Kinect {
  public:
   explicit Kinect(const Files& files, std::uint64_t seed = 1)

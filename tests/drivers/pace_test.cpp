@@ -56,6 +56,18 @@ TEST(Pacer, LosesAChosenTurnThatIsASecondLate) {
   EXPECT_GE(turnOf(pacer), 50u);
 }
 
+TEST(Pacer, ForgetsTheChosenTurnWhenItStartsAnew) {
+  Pacer pacer{Pace::RealTime, 20_ms};
+  turnOf(pacer);
+  std::this_thread::sleep_for(75ms);
+  pacer.chooseNext();
+  pacer.advance();
+  const std::uint64_t index = pacer.index();
+  pacer.restart();
+  EXPECT_EQ(turnOf(pacer), 0u);
+  EXPECT_EQ(pacer.index(), index);
+}
+
 TEST(Pacer, LosesNothingWhereNobodyWaits) {
   Pacer pacer{Pace::Fast, 20_ms};
   EXPECT_EQ(turnOf(pacer), 0u);

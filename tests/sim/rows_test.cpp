@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <stdexcept>
 #include <vector>
 
 namespace toftwin::sim {
@@ -25,6 +26,20 @@ TEST(Rows, EachIsWorkedOnOnce) {
     EXPECT_EQ(timesOf(count, [](int n, const auto& work) { forRows(n, work); }), once) << count;
     EXPECT_EQ(timesOf(count, [](int n, const auto& work) { inFewParts(n, 4, work); }), once) << count;
     EXPECT_EQ(timesOf(count, [](int n, const auto& work) { inParallel(n, 1, work); }), once) << count;
+  }
+}
+
+TEST(Together, BothComeToTheirEndWhoeverThrows) {
+  for (int round = 0; round < 50; ++round) {
+    std::atomic<int> done = 0;
+    const auto counts = [&] { inParallel(1000, 1, [&](int first, int last) { done += last - first; }); };
+    const auto fails = [] { throw std::runtime_error{"as it should"}; };
+    EXPECT_THROW(together(fails, counts), std::runtime_error);
+    EXPECT_EQ(done, 1000);
+    EXPECT_THROW(together(counts, fails), std::runtime_error);
+    EXPECT_EQ(done, 2000);
+    together(counts, counts);
+    EXPECT_EQ(done, 4000);
   }
 }
 

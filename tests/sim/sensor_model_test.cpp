@@ -118,11 +118,18 @@ TEST(Exposing, IsCollectingAndReadingOut) {
   }
 }
 
-/// The Kinect's three steps see the 5th and 7th harmonic at 16 MHz as they see the first: with both folded into it, all raw
-/// exposures collect the same charge; so do the four of the O3D303, whose 3rd is not faint.
+/// The Kinect's three steps see the 5th and 7th harmonic at 16 MHz as they see the first: with both folded into it,
+/// all raw exposures collect the same charge; so do the four of the O3D303, whose 3rd is not faint.
 TEST(Exposing, CollectsTheSameOfFoldedHarmonics) {
-  for (const char* preset : {"kinect_v2", "o3d303"}) {
-    const std::string text = *SensorModel::presetText(preset);
+  // An emitter that rises slowly turns the first harmonic's content, too.
+  const auto slowly = [](std::string text) {
+    for (std::size_t at = 0; (at = text.find("[[modulation]]\n", at)) != std::string::npos; ++at)
+      text.insert(at + 15, "rise_ns = 5\n");
+    return text;
+  };
+  const std::string kinect = *SensorModel::presetText("kinect_v2"), o3d303 = *SensorModel::presetText("o3d303");
+  for (const std::string& text : {kinect, o3d303, slowly(kinect), slowly(o3d303)}) {
+    SCOPED_TRACE(text);
     const SensorModel model = modelOf(text);
     const TraceRequest request = model.traceRequest();
     const Light light = syntheticLight(9, 40, request.frequencies, request.harmonics, [](int x, int y) {
@@ -143,7 +150,7 @@ TEST(Exposing, CollectsTheSameOfFoldedHarmonics) {
       }
       folded.phasors[term] = without.phasors[term] = {};
     }
-    EXPECT_EQ(count, 2) << preset;
+    EXPECT_GE(count, 1);
     const Samples all = model.collect(light, {}, 1, 0), same = model.collect(folded, {}, 1, 0),
                   less = model.collect(without, {}, 1, 0);
     float largest = 0.0F;
@@ -154,10 +161,10 @@ TEST(Exposing, CollectsTheSameOfFoldedHarmonics) {
         largest = std::max(largest, std::abs(less.electrons[e][p] - charge) / charge);
       }
     }
-    EXPECT_GT(largest, 1e-3F) << preset << ": it would have been seen";
+    EXPECT_GT(largest, 1e-3F) << "it would have been seen";
     // What turns harmonics each in its own way must see them apart.
-    const auto apart = modelOf(text + "[[effect]]\ntype = 'propagation_delay'\nper_column_mm = 0.1\n").correlatedTerms();
-    EXPECT_TRUE(std::ranges::none_of(apart, &SeenHarmonic::is_folded)) << preset;
+    const SensorModel apart = modelOf(text + "[[effect]]\ntype = 'propagation_delay'\nper_column_mm = 0.1\n");
+    EXPECT_TRUE(std::ranges::none_of(apart.correlatedTerms(), &SeenHarmonic::is_folded));
   }
 }
 

@@ -12,8 +12,7 @@
 namespace toftwin::sim::testing {
 namespace {
 
-/// A room, a box in it and a rectangle: 26 triangles.
-constexpr auto kRoom = R"(
+const std::string kEmptyRoom = R"(
 [[material]]
 name = "m"
 albedo = 0.5
@@ -23,7 +22,9 @@ size_m = [4, 2.5, 5]
 position_m = [0, 0, 2]
 euler_deg = [3, 17, 5]
 material = "m"
-[[object]]
+)";
+/// With a box and a rectangle: 26 triangles.
+const std::string kRoom = kEmptyRoom + R"([[object]]
 shape = "box"
 size_m = [0.5, 0.7, 0.4]
 position_m = [0.3, -0.2, 1.8]
@@ -45,8 +46,10 @@ Vec3d pointIn(Draw& draw, double half) {
   return {x, y, along(draw)};
 }
 
+using Places = std::array<Vec3d, kLaneCount>;
+
 /// Sixteen rays from points to others, and beyond them as far as `reach` times.
-RTCRayHit16 raysBetween(const std::array<Vec3d, kLaneCount>& from, const std::array<Vec3d, kLaneCount>& to, double reach) {
+RTCRayHit16 raysBetween(const Places& from, const Places& to, double reach) {
   RTCRayHit16 rays{};
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const Vec3d way = to[i] - from[i], d = way / norm(way);
@@ -75,12 +78,17 @@ TEST(FewTriangles, AreThoseOfScenesThatHaveNoMore) {
   EXPECT_TRUE(parsed(kRoom + box).impl().still_few.empty()) << "38";
   EXPECT_EQ(parsed(kRoom + box + "velocity_m_per_s = [1, 0, 0]\n").at(1_s).impl().still_few.size(), 26u)
       << "what moves is not among them";
+  std::string more = kRoom;
+  for (const char* z : {"4", "5", "6"}) {
+    more += "[[object]]\nshape = 'rectangle'\nsize_m = [1, 1, 0]\nmaterial = 'm'\nposition_m = [0, 0, " + std::string{z} + "]\n";
+  }
+  EXPECT_EQ(parsed(more).impl().still_few.size(), kFewTriangles);
   const std::string sphere = "[[object]]\nshape = 'sphere'\nradius_m = 0.2\nposition_m = [0, 0, 3]\nmaterial = 'm'\n";
   EXPECT_TRUE(parsed(kRoom + sphere).impl().still_few.empty());
 }
 
-/// Rays that start and end anywhere in the room, some of which do not count: what Embree says, but within 1e-5 of an edge or
-/// of a ray's ends.
+/// Rays that start and end anywhere in the room, some of which do not count: what Embree says, but within 1e-5 of an
+/// edge or of a ray's ends.
 TEST(FewTriangles, AreMetWhereEmbreeMeetsThem) {
   const Scene scene = parsed(kRoom);
   const Scene::Impl& impl = scene.impl();
@@ -88,7 +96,7 @@ TEST(FewTriangles, AreMetWhereEmbreeMeetsThem) {
   Draw draw{kSeed};
   int met = 0, blocked = 0;
   for (int packet = 0; packet < 4000; ++packet) {
-    std::array<Vec3d, kLaneCount> from, to;
+    Places from, to;
     for (std::size_t i = 0; i < kLaneCount; ++i) from[i] = pointIn(draw, 1.2), to[i] = pointIn(draw, 2.5);
     const RTCRayHit16 rays = raysBetween(from, to, packet % 2 == 0 ? 1.0 : 10.0);
     Lanes<int> valid;
@@ -130,7 +138,7 @@ TEST(FewTriangles, AreMetWhereEmbreeMeetsThem) {
 
 /// From within a box, at points on its edges and on its faces' diagonals: no ray gets out between two triangles.
 TEST(FewTriangles, LetNothingThroughTheirEdges) {
-  const Scene scene = parsed(std::string{kRoom}.substr(0, std::string{kRoom}.find("[[object]]\nshape = \"box\"\nsize_m = [0.5")));
+  const Scene scene = parsed(kEmptyRoom);
   const Scene::Impl& impl = scene.impl();
   ASSERT_EQ(impl.still_few.size(), 12u);
   constexpr unsigned kSeed = 7;
@@ -139,7 +147,7 @@ TEST(FewTriangles, LetNothingThroughTheirEdges) {
   Lanes<int> valid;
   std::fill_n(valid.v, kLaneCount, -1);
   for (int packet = 0; packet < 20'000; ++packet) {
-    std::array<Vec3d, kLaneCount> from, to;
+    Places from, to;
     for (std::size_t i = 0; i < kLaneCount; ++i) {
       const FewTriangle& t = impl.still_few[draw() % 12];
       const Vec3f ends[] = {t.a, t.b, t.c};
@@ -161,8 +169,8 @@ TEST(FewTriangles, LetNothingThroughTheirEdges) {
   }
 }
 
-/// The same exactly along edges, diagonals and through corners, where nothing is rounded: from the middle of a cube at the
-/// places of a grid on its faces.
+/// The same exactly along edges, diagonals and through corners, where nothing is rounded: from the middle of a cube at
+/// the places of a grid on its faces.
 TEST(FewTriangles, LetNothingThroughExactlyOnTheirEdges) {
   const Scene scene = parsed(
       "[[material]]\nname = 'm'\nalbedo = 0.5\n[[object]]\nshape = 'box'\nsize_m = [2, 2, 2]\nmaterial = 'm'\n");
@@ -173,9 +181,9 @@ TEST(FewTriangles, LetNothingThroughExactlyOnTheirEdges) {
   for (int place = 0; place < 6 * 17; ++place) {
     const int face = place / 17, row = place % 17 - 8;
     for (int half = 0; half < 2; ++half) {
-      std::array<Vec3d, kLaneCount> from{}, to;
+      Places from{}, to;
       for (std::size_t i = 0; i < kLaneCount; ++i) {
-        const double a = std::min(static_cast<int>(i) + half, 16) / 8.0 - 1.0, b = row / 8.0, c = face % 2 == 0 ? -1.0 : 1.0;
+        const double a = (static_cast<int>(i) + half) / 8.0 - 1.0, b = row / 8.0, c = face % 2 == 0 ? -1.0 : 1.0;
         to[i] = face / 2 == 0 ? Vec3d{a, b, c} : face / 2 == 1 ? Vec3d{b, c, a} : Vec3d{c, a, b};
       }
       RTCRayHit16 rays = raysBetween(from, to, 2.0);
@@ -185,7 +193,7 @@ TEST(FewTriangles, LetNothingThroughExactlyOnTheirEdges) {
         rays.ray.dir_z[i] = static_cast<float>(to[i].z);
       }
       intersectFew(impl.still_few, valid.v, rays);
-      for (std::size_t i = 0; i < kLaneCount; ++i) ASSERT_EQ(rays.ray.tfar[i], 1.0f) << face << ", " << row << ", " << i;
+      for (const float distance : rays.ray.tfar) ASSERT_EQ(distance, 1.0f) << face << ", " << row;
     }
   }
 }

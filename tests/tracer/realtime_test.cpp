@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <thread>
 #include <vector>
 
 #include "sim/tracer/irradiance_cells.h"
@@ -461,6 +462,16 @@ TEST(Realtime, FoldsHarmonicsThatCannotBeToldApart) {
   }
 }
 
+void expectSame(const Light& a, const Light& b, int frame) {
+  EXPECT_EQ(a.phasors, b.phasors) << frame;
+  EXPECT_EQ(a.steady, b.steady) << frame;
+  EXPECT_EQ(a.ambient, b.ambient) << frame;
+  EXPECT_EQ(a.variance, b.variance) << frame;
+  EXPECT_EQ(a.truth.range_m, b.truth.range_m) << frame;
+  EXPECT_EQ(a.truth.normal, b.truth.normal) << frame;
+  EXPECT_EQ(a.truth.albedo, b.truth.albedo) << frame;
+}
+
 /// While a frame is begun, the last one's light stays as it is; what comes of it is what next() gives. A frame that is begun
 /// and then not wanted counts as one more, here where nothing is looked at again for its footprint.
 TEST(Realtime, IsTheSameBegunAhead) {
@@ -478,15 +489,27 @@ TEST(Realtime, IsTheSameBegunAhead) {
         in_turn.next(moving.at(500_ms), request);
       }
       const Light before = light;
-      ahead.begin(moving.at((frame + 1) * 33.3_ms), request);
-      ASSERT_EQ(light.phasors, before.phasors) << frame;
-      ASSERT_EQ(light.truth.range_m, before.truth.range_m) << frame;
+      {
+        // Whoever reads meanwhile, reads that.
+        const std::jthread begins{[&] { ahead.begin(moving.at((frame + 1) * 33.3_ms), request); }};
+        for (int again = 0; again < 3; ++again) expectSame(light, before, frame);
+      }
+      expectSame(light, before, frame);
       if (extent == 0.0 && frame == 2) continue;
-      ASSERT_EQ(light.phasors, expected.phasors) << frame;
-      ASSERT_EQ(light.variance, expected.variance) << frame;
-      ASSERT_EQ(light.truth.range_m, expected.truth.range_m) << frame;
-      ASSERT_EQ(light.truth.normal, expected.truth.normal) << frame;
+      expectSame(light, expected, frame);
     }
+  }
+  // What the frame that was begun does not want is taken back: other frequencies, and another size of the image.
+  RealtimeTracer changed, straight;
+  TraceRequest other = request, smaller = request;
+  for (Frequency& f : other.frequencies) f = 0.75 * f;
+  smaller.camera.width -= 40;
+  changed.next(moving.at(0_ms), request);
+  straight.next(moving.at(0_ms), request);
+  for (const TraceRequest& wanted : {other, smaller}) {
+    changed.begin(moving.at(33_ms), request);
+    straight.next(moving.at(33_ms), request);
+    expectSame(changed.next(moving.at(66_ms), wanted), straight.next(moving.at(66_ms), wanted), 0);
   }
   EXPECT_THROW(RealtimeTracer{}.finish(), std::logic_error);
 }
@@ -529,6 +552,9 @@ TEST(Realtime, RefusesWhatItCannotDo) {
               HasSubstr("gates need mode unbiased"));
   EXPECT_THAT(problemOf([](TraceRequest& r) { r.camera.fx = -1; }), HasSubstr("focal lengths"));
   EXPECT_THAT(problemOf([](TraceRequest&) {}, {Harmonic::Seen, Harmonic::Seen}), HasSubstr("seen"));
+  std::vector<SeenHarmonic> folded(roomRequest().frequencies.size() * static_cast<std::size_t>(roomRequest().harmonics));
+  folded.back().is_folded = true;
+  EXPECT_THAT(problemOf([](TraceRequest&) {}, folded), HasSubstr("only faint harmonics"));
 }
 
 TEST(IrradianceCells, KeepNewSamplesLonger) {
