@@ -54,15 +54,7 @@ void Pacer::setInterval(Duration frame_interval) {
 
 void Pacer::setPace(Pace pace) {
   pace_ = pace;
-  since_.reset();  // what was not paced is not caught up with
-  triggers_ = 0;
-  forgetChosen();
-}
-
-void Pacer::forgetChosen() {
-  next_.reset();
-  is_chosen_ = false;
-  lost_ = 0;
+  restart();
 }
 
 nanoseconds Pacer::lateness(std::uint64_t index, SteadyTime now) const {
@@ -86,9 +78,11 @@ void Pacer::advance() {
 }
 
 void Pacer::restart() {
-  since_.reset();
+  since_.reset();  // what was not paced is not caught up with
   triggers_ = 0;
-  forgetChosen();
+  next_.reset();
+  is_chosen_ = false;
+  lost_ = 0;
 }
 
 Result<std::uint64_t> Pacer::waitForTurn(const std::stop_token& stop, bool lockstep) {

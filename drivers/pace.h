@@ -70,7 +70,6 @@ class Pacer {
   [[nodiscard]] std::chrono::nanoseconds lateness(std::uint64_t index, SteadyTime now) const;
   /// How many turns after it are due by then.
   [[nodiscard]] std::uint64_t turnsLost(std::uint64_t index, SteadyTime now) const;
-  void forgetChosen();
   /// Begins the present frame. How many were lost before it.
   std::uint64_t takeTurn();
 

@@ -240,8 +240,8 @@ void turnToOtherSide(Hits& hits, std::size_t i) {
   hits.normal.z[i] = -hits.normal.z[i];
 }
 
-/// The offset bounds the error of Embree's robust triangle test (and of few_triangles.cpp's, which errs less), as a distance from the triangle's
-/// plane, for a ray that starts on the triangle. Let m be the triangle's extent per axis. v_i − O is
+/// The offset bounds the error of Embree's robust triangle test (and of few_triangles.cpp's, which errs less), as a
+/// distance from the triangle's plane, for a ray that starts on the triangle. Let m be the triangle's extent per axis. v_i − O is
 /// rounded once (error u m), an edge is the difference of two (|e| ≤ m, error 3um), a component of N
 /// that of two products (2 · 2 · 3u m_j m_k carried on and 6u m_j m_k of its own), and T a dot product:
 ///   |ΔT| ≤ 54 u m_x m_y m_z + 4 u Σ m_i |N_i|,    distance = |ΔT| / |N|

@@ -66,31 +66,25 @@ RTCRayHit16 raysBetween(const Places& from, const Places& to, double reach) {
   return rays;
 }
 
-Scene parsed(const std::string& text) {
-  auto scene = Scene::parse(text, "scene.toml");
-  if (!scene) throw std::runtime_error{scene.error().message};
-  return *std::move(scene);
-}
-
 TEST(FewTriangles, AreThoseOfScenesThatHaveNoMore) {
-  EXPECT_EQ(parsed(kRoom).impl().still_few.size(), 26u);
+  EXPECT_EQ(sceneOf(kRoom).impl().still_few.size(), 26u);
   const std::string box = "[[object]]\nshape = 'box'\nsize_m = [1, 1, 1]\nposition_m = [0, 0, 4]\nmaterial = 'm'\n";
-  EXPECT_TRUE(parsed(kRoom + box).impl().still_few.empty()) << "38";
-  EXPECT_EQ(parsed(kRoom + box + "velocity_m_per_s = [1, 0, 0]\n").at(1_s).impl().still_few.size(), 26u)
+  EXPECT_TRUE(sceneOf(kRoom + box).impl().still_few.empty()) << "38";
+  EXPECT_EQ(sceneOf(kRoom + box + "velocity_m_per_s = [1, 0, 0]\n").at(1_s).impl().still_few.size(), 26u)
       << "what moves is not among them";
   std::string more = kRoom;
   for (const char* z : {"4", "5", "6"}) {
     more += "[[object]]\nshape = 'rectangle'\nsize_m = [1, 1, 0]\nmaterial = 'm'\nposition_m = [0, 0, " + std::string{z} + "]\n";
   }
-  EXPECT_EQ(parsed(more).impl().still_few.size(), kFewTriangles);
+  EXPECT_EQ(sceneOf(more).impl().still_few.size(), kFewTriangles);
   const std::string sphere = "[[object]]\nshape = 'sphere'\nradius_m = 0.2\nposition_m = [0, 0, 3]\nmaterial = 'm'\n";
-  EXPECT_TRUE(parsed(kRoom + sphere).impl().still_few.empty());
+  EXPECT_TRUE(sceneOf(kRoom + sphere).impl().still_few.empty());
 }
 
 /// Rays that start and end anywhere in the room, some of which do not count: what Embree says, but within 1e-5 of an
 /// edge or of a ray's ends.
 TEST(FewTriangles, AreMetWhereEmbreeMeetsThem) {
-  const Scene scene = parsed(kRoom);
+  const Scene scene = sceneOf(kRoom);
   const Scene::Impl& impl = scene.impl();
   constexpr unsigned kSeed = 20261128;
   Draw draw{kSeed};
@@ -138,7 +132,7 @@ TEST(FewTriangles, AreMetWhereEmbreeMeetsThem) {
 
 /// From within a box, at points on its edges and on its faces' diagonals: no ray gets out between two triangles.
 TEST(FewTriangles, LetNothingThroughTheirEdges) {
-  const Scene scene = parsed(kEmptyRoom);
+  const Scene scene = sceneOf(kEmptyRoom);
   const Scene::Impl& impl = scene.impl();
   ASSERT_EQ(impl.still_few.size(), 12u);
   constexpr unsigned kSeed = 7;
@@ -172,7 +166,7 @@ TEST(FewTriangles, LetNothingThroughTheirEdges) {
 /// The same exactly along edges, diagonals and through corners, where nothing is rounded: from the middle of a cube at
 /// the places of a grid on its faces.
 TEST(FewTriangles, LetNothingThroughExactlyOnTheirEdges) {
-  const Scene scene = parsed(
+  const Scene scene = sceneOf(
       "[[material]]\nname = 'm'\nalbedo = 0.5\n[[object]]\nshape = 'box'\nsize_m = [2, 2, 2]\nmaterial = 'm'\n");
   const Scene::Impl& impl = scene.impl();
   ASSERT_EQ(impl.still_few.size(), 12u);
