@@ -176,11 +176,15 @@ class KinectV2Decoder::Impl {
       }
     });
     const Image<std::uint8_t> drops = edgePixels(depth_m, is_edge_, brightness_);
-    for (std::size_t i = 0; i < drops.size(); ++i) {
-      if (drops[i] == 0) continue;
-      reject(result_.flags[i], PixelFlag::Mixed);
-      result_.range_m[i] = kNaN;
-    }
+    forRows(height_, [&](int first, int last) {
+      for (int y = first; y < last; ++y) {
+        for (int x = 0; x < width_; ++x) {
+          if (drops(x, y) == 0) continue;
+          reject(result_.flags(x, y), PixelFlag::Mixed);
+          result_.range_m(x, y) = kNaN;
+        }
+      }
+    });
   }
 
   const DecodeSettings& settings_;

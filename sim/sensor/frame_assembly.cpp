@@ -7,6 +7,8 @@
 #include <numbers>
 #include <utility>
 
+#include "sim/images/rows.h"
+
 namespace toftwin::sim {
 namespace {
 
@@ -16,13 +18,17 @@ constexpr std::array kAllPlanes{PlaneKind::Range,    PlaneKind::Depth,      Plan
                                 PlaneKind::Exposure, PlaneKind::LightSigma, PlaneKind::Color};
 
 void rejectImpossible(RangeImage& range) {
-  for (std::size_t i = 0; i < range.range_m.size(); ++i) {
-    if (range.range_m[i] > 0.0F && std::isfinite(range.range_m[i])) continue;
-    unsigned flags = range.flags[i] | static_cast<unsigned>(PixelFlag::Invalid);
-    if (!std::isnan(range.range_m[i])) flags |= static_cast<unsigned>(PixelFlag::OutOfRange);
-    range.flags[i] = static_cast<std::uint8_t>(flags);
-    range.range_m[i] = std::numeric_limits<float>::quiet_NaN();
-  }
+  const auto width = static_cast<std::size_t>(range.range_m.width());
+  forRows(range.range_m.height(), [&](int first_row, int last_row) {
+    const std::size_t last = static_cast<std::size_t>(last_row) * width;
+    for (std::size_t i = static_cast<std::size_t>(first_row) * width; i < last; ++i) {
+      if (range.range_m[i] > 0.0F && std::isfinite(range.range_m[i])) continue;
+      unsigned flags = range.flags[i] | static_cast<unsigned>(PixelFlag::Invalid);
+      if (!std::isnan(range.range_m[i])) flags |= static_cast<unsigned>(PixelFlag::OutOfRange);
+      range.flags[i] = static_cast<std::uint8_t>(flags);
+      range.range_m[i] = std::numeric_limits<float>::quiet_NaN();
+    }
+  });
 }
 
 Plane planar(PlaneKind kind, int width, int height, int channels, std::vector<float> values) {
@@ -31,10 +37,11 @@ Plane planar(PlaneKind kind, int width, int height, int channels, std::vector<fl
 
 Image<float> depthOf(const Image<float>& range_m, const Image<float>& ray_z, int left, int top) {
   auto depth_m = Image<float>::unset(range_m.width(), range_m.height());
-  for (int y = 0; y < range_m.height(); ++y) {
-    for (int x = 0; x < range_m.width(); ++x)
-      depth_m(x, y) = range_m(x, y) * ray_z(left + x, top + y);
-  }
+  forRows(range_m.height(), [&](int first_row, int last_row) {
+    for (int y = first_row; y < last_row; ++y) {
+      for (int x = 0; x < range_m.width(); ++x) depth_m(x, y) = range_m(x, y) * ray_z(left + x, top + y);
+    }
+  });
   return depth_m;
 }
 
@@ -117,13 +124,13 @@ std::vector<Plane> planesOf(const SensorModel& model, SensorModel::Exposed expos
         planes.push_back(toPlane(kind, depthOf(range.range_m, model.rays().z, left, top)));
         break;
       case PlaneKind::Amplitude:
-        planes.push_back(toPlane(kind, range.amplitude));
+        planes.push_back(toPlane(kind, std::move(range.amplitude)));
         break;
       case PlaneKind::Ambient:
-        planes.push_back(toPlane(kind, range.ambient));
+        planes.push_back(toPlane(kind, std::move(range.ambient)));
         break;
       case PlaneKind::Flags:
-        planes.push_back(toPlane(kind, range.flags));
+        planes.push_back(toPlane(kind, std::move(range.flags)));
         break;
       case PlaneKind::Samples:
         planes.push_back(samplesOf(exposed.samples));
@@ -138,7 +145,7 @@ std::vector<Plane> planesOf(const SensorModel& model, SensorModel::Exposed expos
         planes.push_back(normalsOf(truth.normal));
         break;
       case PlaneKind::Exposure:
-        planes.push_back(toPlane(kind, range.exposure));
+        planes.push_back(toPlane(kind, std::move(range.exposure)));
         break;
       case PlaneKind::Color:
       case PlaneKind::LightSigma:
