@@ -119,7 +119,7 @@ TOFTWIN_INLINE void castAtMovers(const Scene::Impl& scene, const int* valid, RTC
     Lanes<int> can_meet;
     RTCRay16 local;
     if (!takeInto(frameOf(standing), valid, rays, can_meet.v, local)) continue;
-    occluded(can_meet.v, standing.embree, local);
+    occluded(can_meet.v, standing, local);
     takeBack(local, can_meet.v, rays);
   }
 }
@@ -140,8 +140,10 @@ void castRays(const Scene::Impl& scene, const int* valid, RTCRayHit16& rays, boo
     if (!takeInto(frameOf(standing), valid, rays.ray, can_meet.v, local.ray)) continue;
     for (std::size_t i = 0; i < kLaneCount; ++i)
       local.hit.geomID[i] = local.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-    embree::intersect(can_meet.v, standing.embree, local, coherent);
-    takeBack(local, can_meet.v, standing.is_paired, rays);
+    const bool is_done =
+        coherent && standing.tree != nullptr && standing.tree->intersect(can_meet.v, standing.object, local);
+    if (!is_done) embree::intersect(can_meet.v, standing.embree, local, coherent);
+    takeBack(local, can_meet.v, standing.is_paired && !is_done, rays);
   }
 }
 
@@ -152,16 +154,17 @@ void castShadowRays(const Scene::Impl& scene, const int* valid, RTCRay16& rays, 
   } else {
     embree::occluded(valid, scene.still, rays, coherent);
   }
-  castAtMovers(scene, valid, rays, [&](const int* can_meet, RTCScene mover, RTCRay16& local) {
-    embree::occluded(can_meet, mover, local, coherent);
+  castAtMovers(scene, valid, rays, [&](const int* can_meet, const Standing& mover, RTCRay16& local) {
+    if (coherent && mover.tree != nullptr && mover.tree->occluded(can_meet, local)) return;
+    embree::occluded(can_meet, mover.embree, local, coherent);
   });
 }
 
 void castShadowRays(const Scene::Impl& scene, const int* valid, RTCRay16& rays, bool coherent, ThroughGlass& through) {
   startThroughGlass(rays, through);
   occludedThroughGlass(valid, scene.still, rays, coherent, through);
-  castAtMovers(scene, valid, rays, [&](const int* can_meet, RTCScene mover, RTCRay16& local) {
-    occludedThroughGlass(can_meet, mover, local, coherent, through);
+  castAtMovers(scene, valid, rays, [&](const int* can_meet, const Standing& mover, RTCRay16& local) {
+    occludedThroughGlass(can_meet, mover.embree, local, coherent, through);
   });
 }
 

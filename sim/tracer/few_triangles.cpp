@@ -58,7 +58,7 @@ FewTriangle fewTriangle(const Vec3d& a, const Vec3d& b, const Vec3d& c, std::uin
 }
 
 TOFTWIN_VECTOR
-void intersectFew(const std::vector<FewTriangle>& triangles, const int* valid, RTCRayHit16& rays) {
+void intersectFew(std::span<const FewTriangle> triangles, const int* valid, RTCRayHit16& rays) {
   Lanes<float> far, u, v;
   Lanes<unsigned> object, number;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -93,7 +93,7 @@ void intersectFew(const std::vector<FewTriangle>& triangles, const int* valid, R
 }
 
 TOFTWIN_VECTOR
-void occludedFew(const std::vector<FewTriangle>& triangles, const int* valid, RTCRay16& rays) {
+void occludedFew(std::span<const FewTriangle> triangles, const int* valid, RTCRay16& rays) {
   Lanes<int> is_met{};
   Lanes<float> far;
   for (std::size_t i = 0; i < kLaneCount; ++i)

@@ -3,7 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <vector>
+#include <span>
 
 #include <toftwin/geometry.h>
 
@@ -26,7 +26,7 @@ inline constexpr std::size_t kFewTriangles = 32;
 
 /// Closest hits, and shadow rays, of the rays whose `valid` is -1, as embree::intersect() and occluded() give them;
 /// they change nothing for rays that meet none. Along the edges of a mesh a ray meets one of the two triangles.
-void intersectFew(const std::vector<FewTriangle>& triangles, const int* valid, RTCRayHit16& rays);
-void occludedFew(const std::vector<FewTriangle>& triangles, const int* valid, RTCRay16& rays);
+void intersectFew(std::span<const FewTriangle> triangles, const int* valid, RTCRayHit16& rays);
+void occludedFew(std::span<const FewTriangle> triangles, const int* valid, RTCRay16& rays);
 
 }  // namespace toftwin::sim

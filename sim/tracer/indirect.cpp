@@ -17,7 +17,7 @@ constexpr float kMostSamples = 128.0f, kMostWhereThingsMove = 48.0f;
 constexpr float kFewestSamples = 6.0f;
 /// The same of what lit places send to what stands still: it is known well from one frame alone, and moves with the
 /// shadows. (Moving objects may be bent, which leaves few neighbours to smooth over.)
-constexpr float kMostOfLitWhereThingsMove = 2.0f;
+constexpr float kMostOfLitWhereThingsMove = 4.0f;
 /// Of all light on what moves, which moves through it, and whose points are means of several before.
 constexpr float kMostOfWhatMoves = 16.0f;
 /// Cells remember so many times the samples.
@@ -83,7 +83,7 @@ void gatherTiles(const Tracing& tracing, const IrradianceCells& cells, const Lit
       // The last points lie in the last blocks.
       const int left = std::min(i, kept.columns() - 1), top = std::min(j, kept.rows() - 1);
       if (tile.frame == 0 || tile.frame < kept.newest(left, top, i + 3, j + 3)) {
-        gatherer.look(i, j, tile);
+        if (!kept.find(i, j, tile)) gatherer.look(i, j, tile);
         tile.frame = kept.frame();
       }
       gatherer.gather(i, j, tile, first_sample, samples, updates[number]);

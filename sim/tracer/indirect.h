@@ -30,7 +30,7 @@ struct CoarseGrid {
   Image<float> variance_left;  ///< the means' variance as a share of a single sample's
   std::vector<Image<float>> means;  ///< of the light that falls in, by channel (Channels)
   std::vector<Image<float>> squares;  ///< by frequency: mean |first harmonic|² of single samples
-  // The part of it that lit places send, whatever is in its way; in the smooth grid empty.
+  // The part of it that lit places are expected to send; in the smooth grid empty.
   std::vector<Image<float>> lit, lit_squares;
   Image<float> lit_left;
   Image<int> mover;  ///< 0 where the surface stands still, else 1 + the number of the moving object

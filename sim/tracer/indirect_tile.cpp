@@ -14,9 +14,10 @@ namespace {
 
 /// Random dimensions of their own, beyond those of trace().
 constexpr std::uint32_t kBounce = 0x10000, kPick = kBounce + 2, kRoulette = kBounce + 3;
-/// So many rays of each sample say what is in the way of lit places: they cost less than a direction does, which meets a surface
-/// that is to be lit, and leave as much noise.
-constexpr std::uint32_t kRaysToLit = 2;
+/// A tile looks a surface further, for the cells, in one of so many frames once three quarters of those it asks know so
+/// many samples, and all of them any. (Cells that remember fewer never do: where the camera moves fast.)
+constexpr std::uint32_t kTurnsToLookFurther = 2;
+constexpr int kManySamples = 96;
 /// Of direct light that lit places leave less than this share of, so much is left to chance that what survives has this share:
 /// away from corners that is nearly all, and what is dropped needs no ray to the emitter.
 constexpr float kLeastShare = 0.15f;
@@ -144,7 +145,7 @@ void TileGatherer::look(int i, int j, SeenTile& seen) {
   preparePacket(tracing_, block, camera_rays);
   startInTheMiddle(tracing_, block, camera_rays);
   RTCRayHit16 rays;
-  intersect(tracing_, camera_rays, rays, true);
+  intersect(tracing_, camera_rays, rays, false);  // sixteen pixels apart they have little in common
   Lanes<float> unused{};
   endMissed(0.0f, rays, camera_rays, unused);
   findHits(tracing_.scene, camera_rays, rays, hits_);
@@ -153,9 +154,7 @@ void TileGatherer::look(int i, int j, SeenTile& seen) {
   seen.normal = hits_.normal;
   seen.start = hits_.start;
   for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
-    const bool is_hit = camera_rays.valid[lane] != 0;
-    const Standing* mover = is_hit ? tracing_.scene.rows[rays.hit.geomID[lane]].standing : nullptr;
-    seen.mover[lane] = mover != nullptr ? static_cast<int>(mover - tracing_.scene.poses.data()) + 1 : 0;
+    seen.mover[lane] = camera_rays.valid[lane] != 0 ? tracing_.scene.moverOf(rays.hit.geomID[lane]) : 0;
   }
 }
 
@@ -174,15 +173,15 @@ void TileGatherer::gather(int i, int j, const SeenTile& tile, std::uint32_t firs
   normals_ = seen.normal;
   samples_ = samples;
   lookAtLights(tile.valid);
+  const std::uint32_t turn = first_sample / static_cast<std::uint32_t>(samples) + static_cast<std::uint32_t>(i + j) / 4;
   for (int s = 0; s < samples; ++s) {
     const std::uint32_t sample = first_sample + static_cast<std::uint32_t>(s);
     Packet packet = start;
     for (std::size_t lane = 0; lane < kLaneCount; ++lane) packet.index[lane] = numberInSequence(sample, lane);
     hits_ = seen;
     clearSums(sums_);
-    for (std::uint32_t ray = 0; lights_.areAny() && ray < kRaysToLit; ++ray)
-      takeOffBlocked(packet, sample * kRaysToLit + ray, seen);
-    follow(packet, s == 0 ? &update : nullptr);
+    if (lights_.areAny()) mendLights(packet, sample, seen);
+    follow(packet, s == 0 ? &update : nullptr, turn % kTurnsToLookFurther == 0);
     keepSums(tile.valid);
   }
 }
@@ -191,47 +190,64 @@ void TileGatherer::gather(int i, int j, const SeenTile& tile, std::uint32_t firs
 void TileGatherer::lookAtLights(const Lanes<int>& valid) {
   clearSums(fallen_);
   if (!lights_.areAny()) return;
-  lights_.weigh({inSingle(hits_.position), inSingle(normals_), valid}, samples_, shares_);
+  lights_.weigh({inSingle(hits_.position), inSingle(normals_), valid, tile_.mover}, samples_, shares_);
   lights_.add(tracing_, channels_, shares_, fallen_);
   forEachChannel(fallen_, [&](std::size_t channel, const Lanes<float>& lanes) { tile_.lit[channel] = lanes; });
 }
 
-/// One of the lit points, picked by its share, says whether they are seen from here, for one of a sample's rays.
-void TileGatherer::takeOffBlocked(const Packet& packet, std::uint32_t number, const Hits& seen) {
+/// One of the lit points, picked by its share, says whether it is seen from here: in turns of those that a mover is
+/// expected to be in the way of, and of the others. Neighbours have other turns, so that in each frame both are mended
+/// around every place.
+void TileGatherer::mendLights(const Packet& packet, std::uint32_t sample, const Hits& seen) {
+  LitPoints::Pick pick;
   Lanes<float> draws;
-  for (std::size_t i = 0; i < kLaneCount; ++i)
-    draws[i] = randomPair(packet.key(i), numberInSequence(number, i), kPick).u;
-  Lanes<int> picked, valid, is_blocked;
-  lights_.pick(shares_, draws, picked);
+  Lanes<int> is_other;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const std::uint32_t turn = sample + static_cast<std::uint32_t>(i % 4 + i / 4);
+    const RandomPair draw = randomPair(packet.key(i), numberInSequence(turn / 2, i), kPick);
+    is_other[i] = static_cast<int>(turn & 1U);
+    draws[i] = (turn & 1U) != 0 ? draw.v : draw.u;
+  }
+  lights_.pick(shares_, draws, is_other, pick);
   Vec3Lanes places;
-  lights_.placesOf(picked, places);
+  lights_.placesOf(pick, places);
   RTCRay16 rays;
   setShadowRays(seen, places, rays);
+  Lanes<int> valid, is_blocked;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    valid[i] = (packet.valid[i] != 0) & (picked[i] >= 0) ? -1 : 0;
+    valid[i] = (packet.valid[i] != 0) & (pick.point[i] >= 0) ? -1 : 0;
     rays.tfar[i] *= 1.0f - kShortOfIt;
   }
   if (!isAny(valid)) return;
   castShadowRays(tracing_.scene, valid.v, rays, false);
   for (std::size_t i = 0; i < kLaneCount; ++i) is_blocked[i] = (valid[i] != 0) & (rays.tfar[i] < 0.0f) ? -1 : 0;
-  if (isAny(is_blocked)) lights_.takeOff(tracing_, channels_, shares_, picked, is_blocked, 1.0f / kRaysToLit, found_, sums_);
+  lights_.mend(tracing_, channels_, shares_, pick, is_blocked, found_, sums_);
 }
 
 /// One sample of the light that falls onto the hits: from the surface there lit directly, and from what
-/// the cells know of the other light on it. With `update` a further surface is looked at, for the cells.
-void TileGatherer::follow(Packet& packet, CellUpdate* update) {
+/// the cells know of the other light on it. With `update` a further surface is looked at, for the cells, if it is the
+/// tile's turn or if they know little.
+void TileGatherer::follow(Packet& packet, CellUpdate* update, bool is_turn) {
   bounce(hits_, kBounce, true, packet);
   if (!meet(packet, 1, sums_) || tracing_.request.max_surfaces == 2) return;
   Lanes<IrradianceCells::Key> keys;
-  const Lanes<int> is_known = addFromCells(packet, keys, sums_);
+  const Lanes<int> known = addFromCells(packet, keys, sums_);
   if (update == nullptr) return;
-  Lanes<int> is_unknown;
+  std::size_t asked = 0, many = 0;
+  bool are_all_known = true;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    if (keys[i] == 0 || !(packet.throughput[i] * hits_.albedo[i] > 0.0f)) continue;
+    ++asked;
+    many += known[i] >= kManySamples ? 1 : 0;
+    are_all_known = are_all_known && known[i] != 0;
+  }
+  if (!is_turn && are_all_known && 4 * many >= 3 * asked) return;
   Lanes<float> weight;
   Lanes<double> length;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     // Where the cells know too little, the sample itself is the best guess.
-    is_unknown[i] = (keys[i] != 0) & (is_known[i] == 0) ? -1 : 0;
-    weight[i] = is_unknown[i] != 0 ? packet.throughput[i] * hits_.albedo[i] : 0.0f;
+    const bool is_unknown = (keys[i] != 0) & (known[i] == 0);
+    weight[i] = is_unknown ? packet.throughput[i] * hits_.albedo[i] : 0.0f;
     length[i] = packet.length[i] + hits_.distance[i];
   }
   lookFurther(packet);
@@ -287,11 +303,11 @@ void TileGatherer::lookFurther(const Packet& at) {
   addFromCells(packet, keys, further_);
 }
 
-/// Adds what the cells know of the light on the present hits; says where they know enough, and which
-/// cells they are.
+/// Adds what the cells know of the light on the present hits; says of how many samples they know it (0: not enough),
+/// and which cells they are.
 Lanes<int> TileGatherer::addFromCells(const Packet& packet, Lanes<IrradianceCells::Key>& keys,
                                       LaneSums& sums) {
-  Lanes<int> is_known{};
+  Lanes<int> known{};
   Lanes<float> weight{};
   Lanes<double> length;
   keys = {};
@@ -306,13 +322,13 @@ Lanes<int> TileGatherer::addFromCells(const Packet& packet, Lanes<IrradianceCell
   }
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     if (keys[i] == 0 || !(weight[i] > 0.0f)) continue;
-    const auto means = cells_.find(keys[i]);
+    const auto [means, samples] = cells_.find(keys[i]);
     if (means.empty()) continue;
-    is_known[i] = -1;
+    known[i] = samples;
     for (std::size_t c = 0; c < means.size(); ++c) found_[c][i] = means[c];
   }
   addTurned(tracing_, channels_, weight, length, found_, sums);
-  return is_known;
+  return known;
 }
 
 void TileGatherer::keepGeometry(const SeenTile& seen) {

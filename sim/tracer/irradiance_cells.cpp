@@ -52,10 +52,10 @@ std::size_t IrradianceCells::slotOf(Key key) const {
   return slot;
 }
 
-std::span<const float> IrradianceCells::find(Key key) const {
+IrradianceCells::Known IrradianceCells::find(Key key) const {
   const std::size_t slot = slotOf(key);
   if (keys_[slot] != key || counts_[slot] < kEnough) return {};
-  return {&means_[slot * channels_], channels_};
+  return {{&means_[slot * channels_], channels_}, counts_[slot]};
 }
 
 void IrradianceCells::add(Key key, std::span<const float> sample, int memory) {

@@ -21,8 +21,11 @@ class IrradianceCells {
   IrradianceCells(double cell_size_m, std::size_t channels);
 
   [[nodiscard]] Key keyOf(Vec3d place, Vec3d normal) const;
-  /// The cell's means; empty if fewer than kEnough samples are known.
-  [[nodiscard]] std::span<const float> find(Key key) const;
+  struct Known {
+    std::span<const float> means;  ///< empty if fewer than kEnough samples are known
+    int samples;                   ///< that are remembered
+  };
+  [[nodiscard]] Known find(Key key) const;
   /// Has the memory read that find() and add() will want.
   void prepare(Key key) const;
   /// Adds a sample to the cell's means. The newer a sample the more it counts, as early ones knew less of

@@ -99,6 +99,28 @@ void KeptDirect::prepare(const Tracing& tracing) {
   traced_in_.resize(blocks);
   ambient_.resize(keeps_ ? blocks : 0);
   ways_.resize(ambient_.size() * r.emitters.size());
+  points_.resize(ambient_.size());
+}
+
+bool KeptDirect::find(int i, int j, SeenTile& tile) const {
+  // The grid's last row and column lie on last pixels.
+  if (!keeps_ || i + 4 > columns_ || j + 4 > rows_) return false;
+  for (std::size_t lane = 0; lane < kLaneCount; ++lane) {
+    const auto l = static_cast<int>(lane);
+    const Point& point = points_[static_cast<std::size_t>((j + l / 4) * columns_ + i + l % 4)];
+    tile.valid[lane] = point.is_hit ? -1 : 0;
+    tile.mover[lane] = point.mover;
+    tile.position.x[lane] = point.position.x;
+    tile.position.y[lane] = point.position.y;
+    tile.position.z[lane] = point.position.z;
+    tile.normal.x[lane] = point.normal.x;
+    tile.normal.y[lane] = point.normal.y;
+    tile.normal.z[lane] = point.normal.z;
+    tile.start.x[lane] = point.start.x;
+    tile.start.y[lane] = point.start.y;
+    tile.start.z[lane] = point.start.z;
+  }
+  return true;
 }
 
 bool KeptDirect::isStill(std::size_t block, const BlockGeometry& pixels) const {
@@ -142,6 +164,12 @@ void DirectTracer::trace(const Block& block, KeptDirect& kept, std::size_t index
   endMissed(tracing_.scene.ambient_radiance, rays_, packet_, ambient);
   findHits(tracing_.scene, packet_, rays_, hits_);
   addEmission(packet_, hits_, ambient);
+  const bool is_hit = packet_.valid[0] != 0;
+  kept.point(index) = {is_hit,
+                       is_hit ? tracing_.scene.moverOf(rays_.hit.geomID[0]) : 0,
+                       at(hits_.position, 0),
+                       at(hits_.normal, 0),
+                       {hits_.start.x[0], hits_.start.y[0], hits_.start.z[0]}};
   for (std::size_t e = 0; e < tracing_.emitters.size(); ++e) {
     DirectLight light;
     Vec3Lanes places;

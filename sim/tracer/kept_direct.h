@@ -30,6 +30,13 @@ class KeptDirect {
     Lanes<float> weight;
     Lanes<double> length;
   };
+  /// What the central ray of a block's first pixel met: a coarse point (indirect.h).
+  struct Point {
+    bool is_hit;
+    int mover;  ///< CoarseGrid::mover
+    Vec3d position, normal;
+    Vec3f start;
+  };
   /// What the frame's images hold of a block.
   enum class InImages : std::uint8_t {
     Nothing,  ///< of use
@@ -55,6 +62,9 @@ class KeptDirect {
   /// Of all emitters.
   Ways* ways(std::size_t block) { return ways_.data() + block * key_.emitters.size(); }
   Lanes<float>& ambient(std::size_t block) { return ambient_[block]; }
+  Point& point(std::size_t block) { return points_[block]; }
+  /// The coarse points from (i, j) on. False if they are not all first pixels of blocks, or nothing is kept.
+  bool find(int i, int j, SeenTile& tile) const;
 
  private:
   struct Key {
@@ -77,6 +87,7 @@ class KeptDirect {
   std::vector<std::uint32_t> traced_in_;  ///< by block: the frame
   std::vector<Ways> ways_;
   std::vector<Lanes<float>> ambient_;
+  std::vector<Point> points_;
   std::vector<unsigned char> is_kept_;
   std::vector<InImages> in_images_;
 };

@@ -17,6 +17,10 @@ namespace {
 /// So many of each emitter for one receiver: of 8 × 8 cells of the square that directions are drawn from, Sobol's
 /// sequence has one in each.
 constexpr std::uint32_t kCells = 8, kPoints = kCells * kCells;
+/// Movers are expected to be in the way that hide at least so much of what goes through the balls around them: the so
+/// many largest.
+constexpr double kLeastHidden = 0.05;
+constexpr std::size_t kMostBalls = 4;
 constexpr std::uint32_t kLeaving = 0x20000;  // random dimension, beyond those of paths
 /// A column of pixels that no image has, for random numbers that belong to none.
 constexpr std::uint32_t kNoPixel = 0xfffffff0u;
@@ -91,7 +95,27 @@ TOFTWIN_INLINE double pointsPerArea(double per_steradian, double cosine, double 
 
 }  // namespace
 
+/// The largest movers that hide much of what goes through the balls around them.
+void LitPoints::takeBalls(const Tracing& tracing) {
+  balls_.clear();
+  for (std::size_t m = 0; m < tracing.scene.poses.size(); ++m) {
+    const Standing& standing = tracing.scene.poses[m];
+    if (standing.hides < kLeastHidden) continue;
+    const Vec3f middle = (standing.lower + standing.upper) / 2.0f;
+    const Vec3d c =
+        (standing.scene_from_object *
+         Point<Object>{{static_cast<double>(middle.x), static_cast<double>(middle.y), static_cast<double>(middle.z)}})
+            .m;
+    balls_.push_back({static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(c.z),
+                      static_cast<float>(standing.radius), static_cast<float>(1.0 - standing.hides),
+                      static_cast<int>(m) + 1});
+  }
+  std::ranges::stable_sort(balls_, std::ranges::greater{}, &Ball::radius);
+  if (balls_.size() > kMostBalls) balls_.resize(kMostBalls);
+}
+
 void LitPoints::take(const Tracing& tracing, const Channels& channels, std::uint32_t frame) {
+  takeBalls(tracing);
   places_.assign(tracing.emitters.size() * kPoints, Place{});
   for (std::size_t e = 0; e < tracing.emitters.size(); ++e) {
     const PixelKey key = pixelKey(tracing.seed, kNoPixel + static_cast<std::uint32_t>(e), frame);
@@ -122,7 +146,9 @@ void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, const P
   Lanes<float> radiance{};
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     place.density[i] = 1.0f;
+    place.mover[i] = 0;
     if (packet.valid[i] == 0) continue;
+    place.mover[i] = tracing.scene.moverOf(rays.hit.geomID[i]);
     const Vec3d direction = at(packet.direction, i), normal = at(hits.normal, i);
     const double square = hits.distance[i] * hits.distance[i], cosine = std::max(1e-9, -dot(direction, normal));
     const double lit = emitter.intensity(dot(direction, emitter.axis)) * cosine / square;  // W/m²
@@ -150,12 +176,30 @@ void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, const P
 
 namespace {
 
+/// Where the ball is between a place and the receivers, less arrives; not where either is on what is in it.
+TOFTWIN_INLINE void hide(const LitPoints::Receivers& receivers, const Vec3fLanes& position, const Lanes<int>& mover,
+                         const LitPoints::Ball& of, Lanes<float>& open) {
+  const LitPoints::Ball ball = of;
+  const Vec3fLanes& p = receivers.position;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const float dx = position.x[i] - p.x[i], dy = position.y[i] - p.y[i], dz = position.z[i] - p.z[i];
+    const float mx = ball.x - p.x[i], my = ball.y - p.y[i], mz = ball.z - p.z[i];
+    const float along = (mx * dx + my * dy + mz * dz) / (dx * dx + dy * dy + dz * dz + 1e-12f);
+    const float above = along > 0.0f ? along : 0.0f, t = above < 1.0f ? above : 1.0f;
+    const float bx = mx - t * dx, by = my - t * dy, bz = mz - t * dz;
+    const bool is_between = (bx * bx + by * by + bz * bz < ball.radius * ball.radius) & (mover[i] != ball.mover) &
+                            (receivers.mover[i] != ball.mover);
+    open[i] = is_between ? open[i] * ball.open : open[i];
+  }
+}
+
 /// Says whether the place lights any of them.
 TOFTWIN_VECTOR
-bool weighOne(const LitPoints::Receivers& receivers, const Vec3fLanes& position, const Vec3fLanes& normal,
-              const Lanes<float>& density, const Lanes<float>& steady, float directions, Lanes<float>& share,
-              Lanes<float>& way, Lanes<float>& total) {
-  const Vec3fLanes &p = receivers.position, &n = receivers.normal;
+bool weighOne(const LitPoints::Receivers& receivers, const LitPoints::Place& place,
+              const std::vector<LitPoints::Ball>& balls, float directions, std::size_t k, LitPoints::Shares& shares) {
+  const Vec3fLanes &p = receivers.position, &n = receivers.normal, &position = place.position, &normal = place.normal;
+  const Lanes<float>& steady = place.radiance[Channels::kSteady];
+  Lanes<float> share, way, open;
   int any = 0;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const float dx = position.x[i] - p.x[i], dy = position.y[i] - p.y[i], dz = position.z[i] - p.z[i];
@@ -165,23 +209,39 @@ bool weighOne(const LitPoints::Receivers& receivers, const Vec3fLanes& position,
     // g / (density + directions · g) of g = here · there / (π square²)
     const float g = here * there, area = 3.14159265f * square * square;
     const bool is_seen = (here > 0.0f) & (g > 0.0f) & (receivers.valid[i] != 0);
-    share[i] = is_seen ? g / (density[i] * area + directions * g) : 0.0f;
-    total[i] += share[i] * steady[i];
+    share[i] = is_seen ? g / (place.density[i] * area + directions * g) : 0.0f;
     way[i] = __builtin_sqrtf(square);
+    open[i] = 1.0f;
     any |= is_seen ? 1 : 0;
   }
-  return any != 0;
+  if (any == 0) return false;
+  for (const LitPoints::Ball& ball : balls) hide(receivers, position, place.mover, ball, open);
+  Lanes<float> total = shares.total, clear = shares.clear, behind = shares.behind;
+  for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const float light = share[i] * steady[i];
+    total[i] += light * open[i];
+    clear[i] += open[i] == 1.0f ? light : 0.0f;
+    behind[i] += open[i] == 1.0f ? 0.0f : light;
+  }
+  shares.total = total;
+  shares.clear = clear;
+  shares.behind = behind;
+  shares.share[k] = share;
+  shares.way[k] = way;
+  shares.open[k] = open;
+  return true;
 }
 
 TOFTWIN_VECTOR
-void pickBy(const Lanes<float>& share, const Lanes<float>& steady, int number, Lanes<float>& left,
-            Lanes<int>& picked) {
+void pickBy(const Lanes<float>& share, const Lanes<float>& steady, const Lanes<float>& open,
+            const Lanes<int>& is_behind, int number, Lanes<float>& left, Lanes<int>& picked) {
 #pragma GCC unroll 1
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const float part = share[i] * steady[i];
-    const bool is_open = left[i] > 0.0f;
-    left[i] -= is_open ? part : 0.0f;
-    picked[i] = (is_open & (part > 0.0f)) ? number : picked[i];
+    const bool is_of_kind = (open[i] != 1.0f) == (is_behind[i] != 0);
+    const float part = is_of_kind ? share[i] * steady[i] : 0.0f;
+    const bool is_left = left[i] > 0.0f;
+    left[i] -= is_left ? part : 0.0f;
+    picked[i] = (is_left & (part > 0.0f)) ? number : picked[i];
   }
 }
 
@@ -190,84 +250,94 @@ void pickBy(const Lanes<float>& share, const Lanes<float>& steady, int number, L
 void LitPoints::weigh(const Receivers& receivers, int directions, Shares& shares) const {
   shares.share.resize(places_.size());
   shares.way.resize(places_.size());
+  shares.open.resize(places_.size());
   shares.lighting.clear();
   shares.total = {};
+  shares.clear = shares.behind = {};
   for (std::size_t k = 0; k < places_.size(); ++k) {
-    const Place& p = places_[k];
-    if (weighOne(receivers, p.position, p.normal, p.density, p.radiance[Channels::kSteady],
-                 static_cast<float>(directions), shares.share[k], shares.way[k], shares.total)) {
+    if (weighOne(receivers, places_[k], balls_, static_cast<float>(directions), k, shares))
       shares.lighting.push_back(k);
-    }
   }
 }
 
 namespace {
 
-/// Adds share · radiance · exp(−i 2π n f way/c) to the sums of one frequency's wanted harmonics, whose phasors begin
-/// with number `first`: addTurned() without the harmonics that other frequencies want.
+/// Adds share · open · radiance · exp(−i 2π n f way/c) of all points to the sums of one frequency's wanted harmonics,
+/// whose phasors begin with number `first`: addTurned() without the harmonics that other frequencies want.
 TOFTWIN_VECTOR
-void addFrequency(float turns_per_metre, std::size_t first, std::size_t count, const int* orders,
-                  const std::size_t* terms, const Lanes<float>& share, const Lanes<float>& way,
-                  const std::vector<Lanes<float>>& radiance, LaneSums& sums) {
-  Lanes<float> cosine, sine, re, im;
-  turnsOf(way, turns_per_metre, share, cosine, sine, re, im);
-  int order = 1;
-  for (std::size_t k = 0; k < count; ++k) {
-    for (; order < orders[k]; ++order) turnBy(cosine, sine, re, im);
-    addProduct(radiance[Channels::re(first + k)], radiance[Channels::im(first + k)], re, im, sums.re[terms[k]].v,
-               sums.im[terms[k]].v);
+void addFrequency(float turns_per_metre, std::size_t first, std::size_t last, const Channels& channels,
+                  const std::vector<LitPoints::Place>& places, const LitPoints::Shares& shares, LaneSums& sums) {
+  const int* orders = channels.ordersOfTerms().data();
+  const std::size_t* terms = channels.lanes().data();
+  for (const std::size_t k : shares.lighting) {
+    const std::vector<Lanes<float>>& radiance = places[k].radiance;
+    Lanes<float> share, cosine, sine, re, im;
+    for (std::size_t i = 0; i < kLaneCount; ++i) share[i] = shares.share[k][i] * shares.open[k][i];
+    turnsOf(shares.way[k], turns_per_metre, share, cosine, sine, re, im);
+    int order = 1;
+    for (std::size_t phasor = first; phasor < last; ++phasor) {
+      for (; order < orders[phasor]; ++order) turnBy(cosine, sine, re, im);
+      addProduct(radiance[Channels::re(phasor)], radiance[Channels::im(phasor)], re, im, sums.re[terms[phasor]].v,
+                 sums.im[terms[phasor]].v);
+    }
   }
 }
 
 }  // namespace
 
 void LitPoints::add(const Tracing& tracing, const Channels& channels, const Shares& shares, LaneSums& sums) const {
-  const std::vector<int>& orders = channels.ordersOfTerms();
   for (std::size_t i = 0; i < kLaneCount; ++i) sums.steady[i] += shares.total[i];
-  for (std::size_t f = 0; f < tracing.turns_per_metre.size(); ++f) {
-    const std::size_t first = channels.first(f);
-    const std::size_t last = f + 1 < tracing.turns_per_metre.size() ? channels.first(f + 1) : orders.size();
-    for (const std::size_t k : shares.lighting) {
-      addFrequency(static_cast<float>(tracing.turns_per_metre[f]), first, last - first, &orders[first],
-                   &channels.lanes()[first], shares.share[k], shares.way[k], places_[k].radiance, sums);
-    }
+  const std::size_t frequencies = tracing.turns_per_metre.size();
+  for (std::size_t f = 0; f < frequencies; ++f) {
+    const std::size_t last = f + 1 < frequencies ? channels.first(f + 1) : channels.terms().size();
+    addFrequency(static_cast<float>(tracing.turns_per_metre[f]), channels.first(f), last, channels, places_, shares,
+                 sums);
   }
 }
 
-void LitPoints::pick(const Shares& shares, const Lanes<float>& draws, Lanes<int>& picked) const {
+void LitPoints::pick(const Shares& shares, const Lanes<float>& draws, const Lanes<int>& is_other, Pick& pick) const {
   Lanes<float> left;
+  Lanes<int> is_behind;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
+    const bool are_both = (shares.clear[i] > 0.0f) & (shares.behind[i] > 0.0f);
+    is_behind[i] = are_both ? is_other[i] : shares.behind[i] > 0.0f ? 1 : 0;
+    const float all = is_behind[i] != 0 ? shares.behind[i] : shares.clear[i];
+    pick.steady[i] = are_both ? 2.0f * all : all;
+    pick.point[i] = -1;
     // Not quite the total, so that rounding cannot leave the last of them out.
-    left[i] = draws[i] * shares.total[i] * 0.999999f + 1e-30f;
-    picked[i] = -1;
+    left[i] = draws[i] * all * 0.999999f + 1e-30f;
   }
   for (const std::size_t k : shares.lighting)
-    pickBy(shares.share[k], places_[k].radiance[Channels::kSteady], static_cast<int>(k), left, picked);
+    pickBy(shares.share[k], places_[k].radiance[Channels::kSteady], shares.open[k], is_behind, static_cast<int>(k),
+           left, pick.point);
 }
 
-void LitPoints::placesOf(const Lanes<int>& picked, Vec3Lanes& places) const {
+void LitPoints::placesOf(const Pick& pick, Vec3Lanes& places) const {
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const Vec3fLanes& from = places_[static_cast<std::size_t>(std::max(0, picked[i]))].position;
+    const Vec3fLanes& from = places_[static_cast<std::size_t>(std::max(0, pick.point[i]))].position;
     places.x[i] = static_cast<double>(from.x[i]);
     places.y[i] = static_cast<double>(from.y[i]);
     places.z[i] = static_cast<double>(from.z[i]);
   }
 }
 
-void LitPoints::takeOff(const Tracing& tracing, const Channels& channels, const Shares& shares,
-                        const Lanes<int>& picked, const Lanes<int>& is_blocked, float part,
-                        std::vector<Lanes<float>>& radiance, LaneSums& sums) const {
+void LitPoints::mend(const Tracing& tracing, const Channels& channels, const Shares& shares, const Pick& pick,
+                     const Lanes<int>& is_blocked, std::vector<Lanes<float>>& radiance, LaneSums& sums) const {
   Lanes<float> weight{};
   Lanes<double> way{};
   radiance.assign(channels.count(), Lanes<float>{});
+  bool is_any = false;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    if (picked[i] < 0 || is_blocked[i] == 0) continue;
-    const auto k = static_cast<std::size_t>(picked[i]);
-    weight[i] = -part * shares.total[i] / places_[k].radiance[Channels::kSteady][i];
+    if (pick.point[i] < 0) continue;
+    const auto k = static_cast<std::size_t>(pick.point[i]);
+    const float wrong = (is_blocked[i] != 0 ? 0.0f : 1.0f) - shares.open[k][i];
+    if (wrong == 0.0f) continue;
+    is_any = true;
+    weight[i] = wrong * pick.steady[i] / places_[k].radiance[Channels::kSteady][i];
     way[i] = static_cast<double>(shares.way[k][i]);
     for (std::size_t c = 0; c < radiance.size(); ++c) radiance[c][i] = places_[k].radiance[c][i];
   }
-  addTurned(tracing, channels, weight, way, radiance, sums);
+  if (is_any) addTurned(tracing, channels, weight, way, radiance, sums);
 }
 
 TOFTWIN_VECTOR

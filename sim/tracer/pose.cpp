@@ -3,8 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "sim/tracer/emitter.h"
 #include "sim/tracer/hit.h"
+#include "sim/tracer/random.h"
 
 namespace toftwin::sim {
 namespace {
@@ -53,10 +56,40 @@ double radiusOf(const BuiltObject& own, const RTCBounds& box) {
   const auto d = [](float v) { return static_cast<double>(v); };
   const Vec3d lower{d(box.lower_x), d(box.lower_y), d(box.lower_z)};
   const Vec3d upper{d(box.upper_x), d(box.upper_y), d(box.upper_z)};
-  if (own.vertices.empty()) return norm(upper - lower) / 2.0;
+  if (own.vertices.empty()) return std::hypot(own.quadric.radius, own.quadric.half_height);
   double radius = 0.0;
   for (const Vec3d& v : own.vertices) radius = std::max(radius, norm(v - (lower + upper) / 2.0));
   return radius;
+}
+
+double hidesOf(RTCScene mover, const RTCBounds& box, double radius) {
+  constexpr std::uint32_t kLines = 1024;
+  const auto d = [](float v) { return static_cast<double>(v); };
+  const Vec3d middle =
+      Vec3d{d(box.lower_x) + d(box.upper_x), d(box.lower_y) + d(box.upper_y), d(box.lower_z) + d(box.upper_z)} / 2.0;
+  const PixelKey key = pixelKey(seedKey(0), 0, 0);
+  std::uint32_t met = 0;
+  for (std::uint32_t i = 0; i < kLines; ++i) {
+    const RandomPair way = randomPair(key, i, 0), beside = randomPair(key, i, 1);
+    const auto point = [](double along, double turns) {
+      const double r = std::sqrt(std::max(0.0, 1.0 - along * along)), angle = 2.0 * std::numbers::pi * turns;
+      return Vec3d{r * std::cos(angle), r * std::sin(angle), along};
+    };
+    const Vec3d direction = point(1.0 - 2.0 * d(way.u), d(way.v));
+    const Basis across = basisAround(direction);
+    const Vec3d off = point(0.0, d(beside.v)) * (radius * std::sqrt(d(beside.u)));
+    const Vec3d from = middle + across.x * off.x + across.y * off.y - direction * (1.01 * radius);
+    RTCRay ray{};
+    ray.org_x = static_cast<float>(from.x), ray.org_y = static_cast<float>(from.y),
+    ray.org_z = static_cast<float>(from.z);
+    ray.dir_x = static_cast<float>(direction.x), ray.dir_y = static_cast<float>(direction.y),
+    ray.dir_z = static_cast<float>(direction.z);
+    ray.tfar = static_cast<float>(2.02 * radius);
+    ray.mask = 0xffffffffu;
+    embree::occluded(mover, ray);
+    met += ray.tfar < 0.0f ? 1 : 0;
+  }
+  return static_cast<double>(met) / kLines;
 }
 
 void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {
@@ -70,6 +103,8 @@ void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {
   for (const Mover& mover : loaded.movers) {
     Standing& standing = scene.poses.emplace_back();
     standing.embree = mover.embree;
+    standing.tree = mover.tree.get();
+    standing.object = static_cast<std::uint32_t>(mover.object);
     Transform<World, Object>& pose = standing.scene_from_object = poseAt(mover.motion, mover.start, time);
     pose.translation_m = pose.translation_m - loaded.origin_in_world;
     standing.axes = {pose.rotate({1, 0, 0}), pose.rotate({0, 1, 0}), pose.rotate({0, 0, 1})};
@@ -79,6 +114,7 @@ void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {
     standing.lower = {box.lower_x, box.lower_y, box.lower_z};
     standing.upper = {box.upper_x, box.upper_y, box.upper_z};
     standing.radius = mover.radius;
+    standing.hides = mover.hides;
     standing.is_paired = loaded.objects[mover.object].get().is_paired;
     scene.rows[mover.object].standing = &standing;
   }

@@ -13,5 +13,7 @@ void addPlanes(BuiltObject& object);
 double reachOf(const BuiltObject& own);
 /// Radius of a ball around it, whose middle is that of its box in its own frame.
 double radiusOf(const BuiltObject& own, const RTCBounds& box);
+/// Share of the lines through that ball that meet what is in it; not of glass.
+double hidesOf(RTCScene mover, const RTCBounds& box, double radius);
 
 }  // namespace toftwin::sim

@@ -10,6 +10,7 @@
 #include <optional>
 #include <span>
 #include <stdexcept>
+#include <tuple>
 #include <utility>
 
 #include "sim/images/rows.h"
@@ -32,6 +33,7 @@ constexpr int kSamples = 1, kFirstPasses = 12;
 constexpr double kMuchIsNew = 0.5;
 /// So many samples in the whole image look into the pixels where depth jumps, at most 16 in each.
 constexpr int kFootprintSamples = 6'000;
+constexpr int kStrip = 16;  ///< columns of pixels whose depth jumps that are looked into together
 
 TraceRequest directOnly(const TraceRequest& request, int samples) {
   TraceRequest direct = request;
@@ -174,8 +176,10 @@ void RealtimeTracer::Impl::storeDirect(const Part& at, std::size_t block, const 
 /// samples of as many pixels as it has room for. Each turn takes other places on them, as evenly spread.
 void RealtimeTracer::Impl::refineJumps(const Scene& scene, const TraceRequest& request, std::uint32_t turn) {
   if (request.pixel_extent == 0.0) return;
-  const auto pixels = pixelsWithJumps(images.light().truth.range_m);
+  auto pixels = pixelsWithJumps(images.light().truth.range_m);
   if (pixels.empty()) return;
+  // In strips, so that those of a packet are neighbours: edges of things mostly lie one beside the other in a row.
+  std::ranges::sort(pixels, {}, [](const Pixel& p) { return std::tuple{p[0] / kStrip, p[1], p[0]}; });
   const auto count = static_cast<int>(pixels.size());
   const auto share = static_cast<unsigned>(std::clamp(kFootprintSamples / count, 2, static_cast<int>(kLaneCount)));
   constexpr std::uint32_t kTurns = 1U << 24;

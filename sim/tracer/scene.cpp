@@ -283,6 +283,10 @@ struct SceneBuilder {
       RTCBounds box;
       rtcGetSceneBounds(mover.embree, &box);
       mover.radius = radiusOf(object, box);
+      if (object.glass == nullptr) mover.hides = hidesOf(mover.embree, box, mover.radius);
+      const std::size_t quadrangles = object.triangles.size() / (object.is_paired ? 2 : 1);
+      if (quadrangles > 0 && quadrangles <= CoherentTree::kMostQuadrangles && object.glass == nullptr)
+        mover.tree = std::make_shared<const CoherentTree>(object.vertices, object.triangles, object.is_paired);
     }
     placeMovers(*scene, *scene, {});
     if (const RTCError error = rtcGetDeviceError(scene->device); error != RTC_ERROR_NONE) {

@@ -12,6 +12,7 @@
 #include <toftwin/geometry.h>
 
 #include "sim/tracer/bsdf/any.h"
+#include "sim/tracer/coherent_tree.h"
 #include "sim/tracer/embree.h"
 #include "sim/tracer/environment.h"
 #include "sim/tracer/few_triangles.h"
@@ -51,10 +52,13 @@ struct BuiltObject {
 /// meet is taken back.
 struct Standing {
   RTCScene embree = nullptr;
+  const CoherentTree* tree = nullptr;  ///< of meshes that have one
+  std::uint32_t object = 0;            ///< its number
   Transform<World, Object> scene_from_object;
   std::array<Vec3d, 3> axes;  ///< of the object, in the scene
   Vec3f lower, upper;         ///< the box around it, in its own frame
   double radius = 0.0;        ///< of the ball around it whose middle is the box's, m
+  double hides = 0.0;         ///< share of the lines through that ball that meet it
   double blur = 0.0;          ///< bound on what rounding moves rays by that are taken there, m
   bool is_paired = false;     ///< as its object
 };
@@ -73,7 +77,9 @@ struct Mover {
   Transform<World, Object> start;
   double reach = 0.0;  ///< largest |coordinate| in its own frame
   double radius = 0.0;  ///< of the ball around it whose middle is that of its box
+  double hides = 0.0;   ///< share of the lines through that ball that meet it
   RTCScene embree = nullptr;
+  std::shared_ptr<const CoherentTree> tree = nullptr;  ///< of meshes that are worth one
 };
 
 /// A scene as it was loaded, or as it stands at another time. The latter owns no more than the places of
@@ -108,6 +114,12 @@ struct Scene::Impl {
   RTCScene still = nullptr;  ///< what does not move
   std::vector<FewTriangle> still_few;  ///< all of that, if it is so little; else empty
   std::vector<std::uint32_t> still_pairs;  ///< by object, and of nothing: 1 if its triangles are in pairs; empty if none are
+
+  /// 0 of an object that stands still, else 1 + its number among `poses`.
+  [[nodiscard]] int moverOf(unsigned object) const {
+    const Standing* standing = rows[object].standing;
+    return standing != nullptr ? static_cast<int>(standing - poses.data()) + 1 : 0;
+  }
 
   std::shared_ptr<const Impl> loaded;  ///< of a scene at another time: what it was made from
 };

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <limits>
-#include <random>
 
 #include "sim/tracer/lanes.h"
 #include "sim/tracer/scene_impl.h"
+#include "tests/tracer/packets.h"
 #include "tests/tracer/tracing.h"
 
 namespace toftwin::sim::testing {
@@ -37,34 +37,6 @@ position_m = [-0.6, 0.4, 2.4]
 euler_deg = [20, 40, 0]
 material = "m"
 )";
-
-using Draw = std::mt19937;
-
-Vec3d pointIn(Draw& draw, double half) {
-  std::uniform_real_distribution<double> along{-half, half};
-  const double x = along(draw), y = along(draw);
-  return {x, y, along(draw)};
-}
-
-using Places = std::array<Vec3d, kLaneCount>;
-
-/// Sixteen rays from points to others, and beyond them as far as `reach` times.
-RTCRayHit16 raysBetween(const Places& from, const Places& to, double reach) {
-  RTCRayHit16 rays{};
-  for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const Vec3d way = to[i] - from[i], d = way / norm(way);
-    rays.ray.org_x[i] = static_cast<float>(from[i].x);
-    rays.ray.org_y[i] = static_cast<float>(from[i].y);
-    rays.ray.org_z[i] = static_cast<float>(from[i].z);
-    rays.ray.dir_x[i] = static_cast<float>(d.x);
-    rays.ray.dir_y[i] = static_cast<float>(d.y);
-    rays.ray.dir_z[i] = static_cast<float>(d.z);
-    rays.ray.tfar[i] = static_cast<float>(reach * norm(way));
-    rays.ray.mask[i] = 0xffffffffu;
-    rays.hit.geomID[i] = rays.hit.instID[0][i] = RTC_INVALID_GEOMETRY_ID;
-  }
-  return rays;
-}
 
 TEST(FewTriangles, AreThoseOfScenesThatHaveNoMore) {
   EXPECT_EQ(sceneOf(kRoom).impl().still_few.size(), 26u);

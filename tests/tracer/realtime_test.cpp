@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "sim/tracer/irradiance_cells.h"
+#include "sim/tracer/scene_impl.h"
 #include "tests/tracer/tracing.h"
 
 namespace toftwin::sim::testing {
@@ -123,6 +124,22 @@ TEST(Realtime, FollowsABallThatMoves) {
   }());
   for (std::size_t p = 0; p < still.steady.size(); ++p)
     ASSERT_NEAR(run.light->truth.range_m[p], still.truth.range_m[p], 1e-5f) << "direct light knows no past";
+}
+
+/// Lit places count as partly hidden where the ball around a mover is in their way: rays must make up for a plate that
+/// fills little of its own, and for what stands still. It hardly moves, so that no memory is wrong. The median was 1.4
+/// mm; 4.2 with picks that stand for one sample instead of two, 7.9 without them.
+TEST(Realtime, MendsWhatItExpectsOfMovers) {
+  const Scene scene = sceneOf(roomWith("shape = 'box'\nsize_m = [2.2, 1.6, 0.02]\neuler_deg = [0, 90, 0]\n"
+                                       "position_m = [0.2, 0.1, 3.2]\nvelocity_m_per_s = [1e-6, 0, 0]"));
+  ASSERT_NEAR(scene.impl().poses.at(0).hides, 0.32, 0.05);
+  const TraceRequest request = roomRequest();
+  Frames run;
+  for (int frame = 0; frame < 80; ++frame) run.next(scene.at(frame * 33.333333_ms), request);
+  const Judgement judged = judge(*run.light, scene, request);
+  RecordProperty("median_mm", std::to_string(judged.median_mm));
+  EXPECT_LT(judged.median_mm, 2.0);
+  EXPECT_GT(judged.within, 0.9);
 }
 
 /// Blocks of pixels that no mover is near to keep their direct light; it must be the bits of tracing it again. The
@@ -564,12 +581,12 @@ TEST(IrradianceCells, KeepNewSamplesLonger) {
   EXPECT_NE(key, cells.keyOf({0.05, 0.25, -0.35}, {0, 0, -1}));
   EXPECT_NE(key, cells.keyOf({0.05, 0.25, -0.45}, {0, 0, 1}));
   for (int k = 1; k <= 10; ++k) {
-    EXPECT_EQ(cells.find(key).empty(), k <= IrradianceCells::kEnough);
+    EXPECT_EQ(cells.find(key).means.empty(), k <= IrradianceCells::kEnough);
     const float sample = static_cast<float>(k);
     cells.add(key, {&sample, 1}, 100);
   }
   // Σ 2k/n(n+1) · k = (2n + 1)/3
-  EXPECT_NEAR(cells.find(key)[0], 7.0f, 1e-5f);
+  EXPECT_NEAR(cells.find(key).means[0], 7.0f, 1e-5f);
 }
 
 }  // namespace
