@@ -4,8 +4,10 @@
 #include <fmt/format.h>
 #include <toftwin/modulation.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 
 #include "sim/sensor/correlate.h"
 
@@ -149,6 +151,19 @@ void checkExposures(settings::Table& table, const CameraFile& file) {
 
 }  // namespace
 
+std::string CameraFile::Emitter::problemOfPattern() const {
+  if (pattern.empty() && pattern_deg.empty()) return "";
+  if (pattern.size() != pattern_deg.size() || pattern.size() < 2)
+    return fmt::format("has {} numbers of pattern at {} of pattern_deg: it must have as many, and at least two",
+                       pattern.size(), pattern_deg.size());
+  if (pattern_deg.front() != 0.0 || std::ranges::adjacent_find(pattern_deg, std::greater_equal{}) != pattern_deg.end())
+    return "has pattern_deg that does not ascend from 0";
+  if (std::ranges::all_of(pattern, [](double value) { return value == 0.0; }))
+    return "has a pattern that is dark everywhere; remove the emitter";
+  if (isotropic) return "is isotropic and has a pattern: it can be one of them";
+  return "";
+}
+
 Duration CameraFile::exposureTime() const {
   Duration time = -sampling.gap;
   for (const double factor : sampling.exposure_factors) {
@@ -170,6 +185,7 @@ CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effect
     if (std::hypot(emitter.axis[0], emitter.axis[1], emitter.axis[2]) < 1e-6) {
       table.complain("emitter", "has an axis of length 0, which points nowhere");
     }
+    if (const std::string problem = emitter.problemOfPattern(); !problem.empty()) table.complain("emitter", problem);
     if (emitter.power_w == 0.0) table.complain("emitter", "has power_w = 0 and gives no light; remove it");
   }
   if (file.decoder.nearest >= file.decoder.farthest) {

@@ -43,6 +43,10 @@ struct CameraFile {
     double lobe_exponent = 1.0;
     Angle half_angle = 90_deg;
     bool isotropic = false;
+    std::vector<double> pattern_deg, pattern;
+
+    /// What is wrong with the pattern; empty if nothing is.
+    [[nodiscard]] std::string problemOfPattern() const;
 
     template <class Visitor>
     void visit(Visitor& v) {
@@ -56,6 +60,11 @@ struct CameraFile {
                "m of I = power (m + 1) / 2 pi cos^m: 1 is Lambertian");
       v.quantity("half_angle", half_angle, degree, {0.1, 90.0}, "no light outside this cone");
       v.flag("isotropic", isotropic, "the same in all directions instead, power / 4 pi");
+      v.numbers("pattern_deg", pattern_deg, {0.0, 90.0},
+                "instead of lobe and cone, a pattern as it was measured, vignetting with it: angles from the axis, "
+                "ascending from 0");
+      v.numbers("pattern", pattern, {0.0, 1e6},
+                "relative intensity at those angles, linear between, dark beyond; power_w is that of all of it");
     }
   };
 

@@ -223,7 +223,9 @@ TraceRequest SensorModel::traceRequest() const {
          .power_w = emitter.power_w,
          .lobe_exponent = emitter.lobe_exponent,
          .half_angle = emitter.half_angle,
-         .isotropic = emitter.isotropic});
+         .isotropic = emitter.isotropic,
+         .pattern_deg = emitter.pattern_deg,
+         .pattern = emitter.pattern});
   }
   return request;
 }

@@ -20,7 +20,7 @@ constexpr float kFewestSamples = 6.0f;
 constexpr float kMostOfLitWhereThingsMove = 4.0f;
 /// Of all light on what moves, which moves through it, and whose points are means of several before.
 constexpr float kMostOfWhatMoves = 16.0f;
-/// Cells remember so many times the samples.
+/// Cells remember so many times the samples; for twice as many frames once they are added to in every second one alone.
 constexpr int kCellsPerPoints = 2, kCellsWhereThingsMove = 4;
 /// Light is remembered for so much of the camera's way: its emitters move with it, which turns phasors.
 constexpr double kMemory_m = 0.03;

@@ -35,6 +35,19 @@ TEST(CameraFile, ErrorsNameFileLineKeyBoundAndUnit) {
               HasSubstr("every range would be invalid"));
 }
 
+TEST(CameraFile, EmittersHaveTheirMeasuredPattern) {
+  const auto with = [](const std::string& keys) { return "[[emitter]]\n" + keys + "\n[[modulation]]\n"; };
+  const TraceRequest request = modelOf(with("pattern_deg = [0, 20, 35]\npattern = [1, 1.1, 0]")).traceRequest();
+  EXPECT_THAT(request.emitters.at(0).pattern_deg, ElementsAre(0.0, 20.0, 35.0));
+  EXPECT_THAT(request.emitters.at(0).pattern, ElementsAre(1.0, 1.1, 0.0));
+  EXPECT_THAT(errorOf(with("pattern_deg = [0, 20]\npattern = [1]")), HasSubstr("1 numbers of pattern at 2 of pattern_deg"));
+  EXPECT_THAT(errorOf(with("pattern = [1, 1]")), HasSubstr("2 numbers of pattern at 0"));
+  EXPECT_THAT(errorOf(with("pattern_deg = [0, 20, 20]\npattern = [1, 1, 1]")), HasSubstr("ascend from 0"));
+  EXPECT_THAT(errorOf(with("pattern_deg = [5, 20]\npattern = [1, 1]")), HasSubstr("ascend from 0"));
+  EXPECT_THAT(errorOf(with("pattern_deg = [0, 20]\npattern = [0, 0]")), HasSubstr("dark everywhere"));
+  EXPECT_THAT(errorOf(with("isotropic = true\npattern_deg = [0, 20]\npattern = [1, 1]")), HasSubstr("one of them"));
+}
+
 TEST(CameraFile, PhysicsThatCannotBeIsAnError) {
   EXPECT_THAT(errorOf("[[emitter]]\n[[modulation]]\nexposure_us = 20000\n"),
               HasSubstr("the gaps between them take 81.5 ms"));
