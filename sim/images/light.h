@@ -45,11 +45,13 @@ struct SeenHarmonic {
 /// The light that reaches each pixel from the camera's own emitters, before any electronics.
 ///
 /// `phasors[f * harmonics + (n - 1)]` holds, for modulation frequency f and harmonic n = 1 … harmonics,
+///     P(p) = Σ_paths w · exp(−i 2π n f L / c)
 /// with L the optical length from emitter over all surfaces to the pinhole and w the path's radiance
 /// [W m⁻² sr⁻¹]. A single surface at range r beside the emitter has arg P = −4π f r / c.
 /// A harmonic that the camera does not correlate may be an empty image.
 /// Without frequencies (a pulsed camera), `phasors[i]` holds gate charges, g₁ in the real part and g₂ in the
 /// imaginary one, g the i-th PathFunctions of the request:
+///     Σ_paths w · g(L)
 /// so that what is linear in light (scatter) acts on them unchanged.
 /// `steady` is the sum of all w alone: the emitters' unmodulated radiance.
 /// `ambient` is the radiance of everything else (sun, lamps), unmodulated.

@@ -43,6 +43,7 @@ std::vector<SeenHarmonic> foldedTerms(const std::vector<Response>& responses, in
 Light correlatedPart(const Light& light, const std::vector<Response>& responses, bool all_harmonics);
 
 /// Collects a raw exposure's charge, noise-free: at step k, θₖ = 2πk/steps,
+///     tap 0, 1 = g/2 · ( L + A ± m Re Σₙ ĉₙ Pₙ e^(i n θₖ) )
 /// with the light's phasors Pₙ, its own unmodulated radiance L, the ambient radiance A, and g
 /// electrons per radiance. The light's modulation error adds to ĉₙ and θₖ. Wiggling is born here:
 /// harmonics that the steps cannot tell from the fundamental. The light has the responses' frequencies in

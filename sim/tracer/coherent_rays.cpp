@@ -18,6 +18,8 @@ constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr int kMostLeaves = 32;
 /// Of what is still to be searched: fifteen a level, of as many levels as trees can have.
 constexpr std::size_t kDeepest = 128;
+/// Slopes of bundles are below this.
+constexpr float kSteepest = 4.0f;
 
 /// Rays through one point: the axis that they go along, and between which slopes to it.
 struct Bundle {
@@ -76,7 +78,7 @@ bool bundle(const std::array<float, 3>& apex, const Vec3Row& directions, const i
   out.k = along(0) > along(1) ? (along(0) > along(2) ? 0 : 2) : (along(1) > along(2) ? 1 : 2);
   out.u = (out.k + 1) % 3;
   out.v = (out.k + 2) % 3;
-  if (!(4.0f * along(out.k) > std::max(across(out.u), across(out.v)))) return false;
+  if (!(kSteepest * along(out.k) > std::max(across(out.u), across(out.v)))) return false;
   out.sign = least[out.k] > 0.0f ? 1.0f : -1.0f;
   out.apex = apex;
   Lanes<float> slopes;
@@ -143,7 +145,7 @@ void meetCorners(const CoherentTree::Leaf& leaf, const Bundle& bundle, float far
       high[i] = larger(k, high[i]);
     }
   }
-  const float wide = 8.0f * pad;  // slopes are less than 4
+  const float wide = 2.0f * kSteepest * pad;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const int is_met = (above_u[i] >= -wide) & (below_u[i] >= -wide) & (above_v[i] >= -wide) & (below_v[i] >= -wide) &
                        (high[i] >= -pad) & (low[i] <= far + pad);
@@ -320,7 +322,7 @@ bool mayHide(const CoherentTree::Leaf& leaf, const Prepared& prepared, std::size
   return any != 0;
 }
 
-/// Asks the quadrangle's halves, as intersectFew() takes them, about the rays themselves. False if no ray is left.
+/// Asks the quadrangle's halves, as occludedFew() takes them, about the rays themselves. False if no ray is left.
 bool takeHidden(const CoherentTree::Leaf& leaf, std::size_t j, const Lanes<int>& may_hide, Shadows& shadows,
                 RTCRay16& rays) {
   const auto corner = [&](std::size_t which) {
@@ -336,6 +338,20 @@ bool takeHidden(const CoherentTree::Leaf& leaf, std::size_t j, const Lanes<int>&
     any |= shadows.is_lit[i];
   }
   return any != 0;
+}
+
+/// Calls work(prepared, j) for the quadrangles of a leaf that the bundle may meet, until it says that that is enough.
+template <class Work>
+void forMet(const CoherentTree::Leaf& leaf, const Bundle& bundle, float far, const Work& work) {
+  Lanes<int> may_meet;
+  meetCorners(leaf, bundle, far, may_meet);
+  unsigned bits = bitsOf(may_meet);
+  if (bits == 0) return;
+  Prepared prepared;
+  prepare(leaf, bundle, prepared);
+  for (; bits != 0; bits &= bits - 1) {
+    if (!work(prepared, static_cast<std::size_t>(std::countr_zero(bits)))) return;
+  }
 }
 
 /// All rays' start, if it is one.
@@ -429,16 +445,10 @@ bool CoherentTree::intersect(const int* valid, std::uint32_t object, RTCRayHit16
   for (std::size_t i = 0; i < kLaneCount; ++i) closest.far[i] = valid[i] != 0 ? rays.ray.tfar[i] : -kInfinity;
   float far = farthest(closest.far, direction[of.k], of.sign);
   const bool is_done = search(of, far, [&](const Leaf& leaf) {
-    Lanes<int> may_meet;
-    meetCorners(leaf, of, far, may_meet);
-    unsigned bits = bitsOf(may_meet);
-    if (bits == 0) return;
-    Prepared prepared;
-    prepare(leaf, of, prepared);
-    for (; bits != 0; bits &= bits - 1) {
-      const auto j = static_cast<std::size_t>(std::countr_zero(bits));
+    forMet(leaf, of, far, [&](const Prepared& prepared, std::size_t j) {
       meet(prepared, j, leaf.triangle[j], direction, rays.ray.tnear, closest);
-    }
+      return true;
+    });
     far = farthest(closest.far, direction[of.k], of.sign);
   });
   if (!is_done) return false;
@@ -459,19 +469,12 @@ bool CoherentTree::occluded(const int* valid, RTCRay16& rays) const {
   Lanes<float> before;
   std::copy_n(rays.tfar, kLaneCount, before.v);
   const bool is_done = search(of, far, [&](const Leaf& leaf) {
-    Lanes<int> may_meet;
-    meetCorners(leaf, of, far, may_meet);
-    unsigned bits = bitsOf(may_meet);
-    if (bits == 0) return;
-    Prepared prepared;
-    prepare(leaf, of, prepared);
-    for (; bits != 0; bits &= bits - 1) {
-      const auto j = static_cast<std::size_t>(std::countr_zero(bits));
+    forMet(leaf, of, far, [&](const Prepared& prepared, std::size_t j) {
       Lanes<int> may_hide;
-      if (!mayHide(leaf, prepared, j, shadows, may_hide) || takeHidden(leaf, j, may_hide, shadows, rays)) continue;
+      if (!mayHide(leaf, prepared, j, shadows, may_hide) || takeHidden(leaf, j, may_hide, shadows, rays)) return true;
       far = -kInfinity;
-      return;
-    }
+      return false;
+    });
   });
   if (!is_done) std::copy_n(before.v, kLaneCount, rays.tfar);
   return is_done;

@@ -17,10 +17,7 @@ std::vector<Shade> shadesOf(const Tracing& tracing) {
   std::vector<Shade> shades;
   const auto camera_from_scene = tracing.scene_from_camera.inverse();
   for (const Standing& standing : tracing.scene.poses) {
-    const Vec3f lower = standing.lower, upper = standing.upper, middle = (lower + upper) / 2.0f;
-    const Vec3d object{static_cast<double>(middle.x), static_cast<double>(middle.y), static_cast<double>(middle.z)};
-    const Vec3d in_scene = (standing.scene_from_object * Point<Object>{object}).m;
-    const Vec3d c = (camera_from_scene * Point<World>{in_scene}).m;
+    const Vec3d c = (camera_from_scene * Point<World>{standing.middle()}).m;
     // Wider by far more than what single precision rounds, here and in rays.
     const double radius = 1.001 * standing.radius + 1e-4 * norm(c) + standing.blur;
     const auto add = [&](Vec3d to, double by) {

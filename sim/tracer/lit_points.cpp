@@ -101,11 +101,7 @@ void LitPoints::takeBalls(const Tracing& tracing) {
   for (std::size_t m = 0; m < tracing.scene.poses.size(); ++m) {
     const Standing& standing = tracing.scene.poses[m];
     if (standing.hides < kLeastHidden) continue;
-    const Vec3f middle = (standing.lower + standing.upper) / 2.0f;
-    const Vec3d c =
-        (standing.scene_from_object *
-         Point<Object>{{static_cast<double>(middle.x), static_cast<double>(middle.y), static_cast<double>(middle.z)}})
-            .m;
+    const Vec3d c = standing.middle();
     balls_.push_back({static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(c.z),
                       static_cast<float>(standing.radius), static_cast<float>(1.0 - standing.hides),
                       static_cast<int>(m) + 1});

@@ -36,8 +36,8 @@ class LitPoints {
     std::vector<Lanes<float>> open;     ///< what is expected to arrive: less than 1 where a mover's ball is in the way
     std::vector<std::size_t> lighting;  ///< those that light any of the receivers
     Lanes<float> total;                 ///< of steady radiance that is expected to arrive
-    Lanes<float> clear,
-        behind;  ///< of steady radiance: of points that nothing is expected to hide in part, and of others
+    Lanes<float> clear;   ///< of the steady radiance of points that nothing is expected to hide
+    Lanes<float> behind;  ///< of that of the others, whether it arrives or not
   };
   /// Sixteen lit points, one for each point of a tile.
   struct Place {

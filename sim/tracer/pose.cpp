@@ -52,21 +52,27 @@ double reachOf(const BuiltObject& own) {
   return reach;
 }
 
-double radiusOf(const BuiltObject& own, const RTCBounds& box) {
+namespace {
+
+Vec3d middleOf(const RTCBounds& box) {
   const auto d = [](float v) { return static_cast<double>(v); };
-  const Vec3d lower{d(box.lower_x), d(box.lower_y), d(box.lower_z)};
-  const Vec3d upper{d(box.upper_x), d(box.upper_y), d(box.upper_z)};
+  return Vec3d{d(box.lower_x) + d(box.upper_x), d(box.lower_y) + d(box.upper_y), d(box.lower_z) + d(box.upper_z)} / 2.0;
+}
+
+}  // namespace
+
+double radiusOf(const BuiltObject& own, const RTCBounds& box) {
   if (own.vertices.empty()) return std::hypot(own.quadric.radius, own.quadric.half_height);
+  const Vec3d middle = middleOf(box);
   double radius = 0.0;
-  for (const Vec3d& v : own.vertices) radius = std::max(radius, norm(v - (lower + upper) / 2.0));
+  for (const Vec3d& v : own.vertices) radius = std::max(radius, norm(v - middle));
   return radius;
 }
 
 double hidesOf(RTCScene mover, const RTCBounds& box, double radius) {
   constexpr std::uint32_t kLines = 1024;
   const auto d = [](float v) { return static_cast<double>(v); };
-  const Vec3d middle =
-      Vec3d{d(box.lower_x) + d(box.upper_x), d(box.lower_y) + d(box.upper_y), d(box.lower_z) + d(box.upper_z)} / 2.0;
+  const Vec3d middle = middleOf(box);
   const PixelKey key = pixelKey(seedKey(0), 0, 0);
   std::uint32_t met = 0;
   for (std::uint32_t i = 0; i < kLines; ++i) {

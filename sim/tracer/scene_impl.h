@@ -61,6 +61,13 @@ struct Standing {
   double hides = 0.0;         ///< share of the lines through that ball that meet it
   double blur = 0.0;          ///< bound on what rounding moves rays by that are taken there, m
   bool is_paired = false;     ///< as its object
+
+  /// Of the ball around it, in the scene.
+  [[nodiscard]] Vec3d middle() const {
+    const Vec3f own = (lower + upper) / 2.0f;
+    const Vec3d exact{static_cast<double>(own.x), static_cast<double>(own.y), static_cast<double>(own.z)};
+    return (scene_from_object * Point<Object>{exact}).m;
+  }
 };
 
 /// What the tracer reads of an object at each hit.

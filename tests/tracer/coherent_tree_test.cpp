@@ -156,8 +156,7 @@ TEST(CoherentTree, LetsNothingThroughItsEdges) {
   constexpr unsigned kSeed = 5;
   Draw draw{kSeed};
   std::uniform_real_distribution<double> share{0.0, 1.0};
-  Lanes<int> valid;
-  std::fill_n(valid.v, kLaneCount, -1);
+  Lanes<int> valid = everyLane();
   int done = 0;
   for (int bundle = 0; bundle < 20'000; ++bundle) {
     const Vec3d apex = rounded(pointIn(draw, 0.2));
@@ -229,8 +228,7 @@ TEST(CoherentTree, HidesNothingOfWhatIsConvex) {
   constexpr unsigned kSeed = 3;
   Draw draw{kSeed};
   std::uniform_real_distribution<double> share{0.0, 1.0};
-  Lanes<int> valid;
-  std::fill_n(valid.v, kLaneCount, -1);
+  Lanes<int> valid = everyLane();
   int lit = 0, hidden = 0;
   for (int bundle = 0; bundle < 20'000; ++bundle) {
     const Vec3d shine = pointIn(draw, 2.0);
@@ -273,8 +271,7 @@ TEST(CoherentTree, AsksOnlyAboutRaysThatCount) {
   Places from, to, back;
   for (std::size_t i = 0; i < kLaneCount; ++i)
     from[i] = apex, to[i] = pointIn(draw, 0.1), back[i] = to[i] + Vec3d{0.0, 0.0, 1.0};
-  Lanes<int> valid;
-  std::fill_n(valid.v, kLaneCount, -1);
+  Lanes<int> valid = everyLane();
   RTCRayHit16 all = raysBetween(from, to, 10.0);
   RTCRay16 all_shadows = raysBetween(back, from, 1.0).ray;
   ASSERT_TRUE(tree.intersect(valid.v, 0, all) && tree.occluded(valid.v, all_shadows));
@@ -306,8 +303,7 @@ TEST(CoherentTree, AsksOnlyAboutRaysThatCount) {
 TEST(CoherentTree, GivesUpWhatIsNoBundle) {
   const Mesh mesh = ball(160, 0.05);
   const CoherentTree tree{mesh.vertices, mesh.triangles, true};
-  Lanes<int> valid;
-  std::fill_n(valid.v, kLaneCount, -1);
+  Lanes<int> valid = everyLane();
   constexpr unsigned kSeed = 2;
   Draw draw{kSeed};
   Places one, other, narrow, wide, around;
@@ -342,8 +338,7 @@ TEST(CoherentTree, GivesUpWhatIsNoBundle) {
 /// One triangle has a tree as well.
 TEST(CoherentTree, IsOfOneTriangle) {
   const CoherentTree tree{{{-1, -1, 1}, {1, -1, 1}, {0, 1, 1}}, {{0, 1, 2}}, false};
-  Lanes<int> valid;
-  std::fill_n(valid.v, kLaneCount, -1);
+  Lanes<int> valid = everyLane();
   Places from{}, to;
   for (std::size_t i = 0; i < kLaneCount; ++i) to[i] = {0.001 * static_cast<double>(i), 0.0, 1.0};
   RTCRayHit16 rays = raysBetween(from, to, 10.0);
@@ -359,8 +354,7 @@ TEST(CoherentTree, IsOfOneTriangle) {
 TEST(CoherentTree, TakesBlocksOfPixels) {
   const Mesh mesh = ball(96, 0.05);
   const CoherentTree tree{mesh.vertices, mesh.triangles, true};
-  Lanes<int> valid;
-  std::fill_n(valid.v, kLaneCount, -1);
+  Lanes<int> valid = everyLane();
   int done = 0, all = 0;
   for (int y = -16; y < 16; ++y) {
     for (int x = -16; x < 16; ++x, ++all) {

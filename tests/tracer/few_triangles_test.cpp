@@ -110,8 +110,7 @@ TEST(FewTriangles, LetNothingThroughTheirEdges) {
   constexpr unsigned kSeed = 7;
   Draw draw{kSeed};
   std::uniform_real_distribution<float> share{0.0f, 1.0f};
-  Lanes<int> valid;
-  std::fill_n(valid.v, kLaneCount, -1);
+  Lanes<int> valid = everyLane();
   for (int packet = 0; packet < 20'000; ++packet) {
     Places from, to;
     for (std::size_t i = 0; i < kLaneCount; ++i) {
@@ -142,8 +141,7 @@ TEST(FewTriangles, LetNothingThroughExactlyOnTheirEdges) {
       "[[material]]\nname = 'm'\nalbedo = 0.5\n[[object]]\nshape = 'box'\nsize_m = [2, 2, 2]\nmaterial = 'm'\n");
   const Scene::Impl& impl = scene.impl();
   ASSERT_EQ(impl.still_few.size(), 12u);
-  Lanes<int> valid;
-  std::fill_n(valid.v, kLaneCount, -1);
+  Lanes<int> valid = everyLane();
   for (int place = 0; place < 6 * 17; ++place) {
     const int face = place / 17, row = place % 17 - 8;
     for (int half = 0; half < 2; ++half) {

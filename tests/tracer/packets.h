@@ -2,6 +2,7 @@
 // Sixteen rays at a time, as those who find what they meet take them.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <random>
 
@@ -18,6 +19,12 @@ inline Vec3d pointIn(Draw& draw, double half) {
   std::uniform_real_distribution<double> along{-half, half};
   const double x = along(draw), y = along(draw);
   return {x, y, along(draw)};
+}
+
+inline Lanes<int> everyLane() {
+  Lanes<int> valid;
+  std::fill_n(valid.v, kLaneCount, -1);
+  return valid;
 }
 
 using Places = std::array<Vec3d, kLaneCount>;
