@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <mutex>
 #include <optional>
 #include <span>
 #include <stdexcept>
@@ -42,6 +41,13 @@ TraceRequest directOnly(const TraceRequest& request, int samples) {
   return direct;
 }
 
+Lanes<Vec3f> normalsOf(const BlockGeometry& pixels) {
+  Lanes<Vec3f> normals;
+  for (std::size_t i = 0; i < kLaneCount; ++i)
+    normals[i] = {pixels.normal_x[i], pixels.normal_y[i], pixels.normal_z[i]};
+  return normals;
+}
+
 /// A packet of so many samples of each of those pixels.
 void preparePixels(const Tracing& tracing, std::span<const Pixel> pixels, std::size_t samples, Block& block) {
   Lanes<int> columns, rows;
@@ -70,20 +76,15 @@ struct RealtimeTracer::Impl {
     Channels channels, indirect_channels;
     bool is_gathered;  ///< all of it that leaves the images alone is done
   };
-  struct TruthOfBlock {
-    std::size_t block;
-    TruthLanes truth;
-  };
-
   std::optional<Begun> begun;
   LightImages images;
   IndirectLight indirect;
   std::vector<BlockGeometry> geometry;
   KeptDirect kept;
   std::uint32_t frame = 0;  ///< of those with light over several surfaces
-  /// Of blocks traced since the images were written, in the order of frames.
-  std::vector<std::vector<TruthOfBlock>> truths;
-  std::mutex truths_mutex;
+  /// By block; of those traced since the images were written. Its normals lie in `geometry`.
+  std::vector<BlockTruth> truth_ahead;
+  std::vector<unsigned char> is_ahead_of_images;
 
   template <class Work>
   void forBlocks(const CameraInfo& camera, const Work& work) const;
@@ -112,10 +113,11 @@ void RealtimeTracer::Impl::forBlocks(const CameraInfo& camera, const Work& work)
 void RealtimeTracer::Impl::traceDirect(const Tracing& tracing, bool is_all, bool is_ahead) {
   const BlockShape shape = BlockShape::forSamples(1);
   kept.prepare(tracing);
+  is_ahead_of_images.resize(geometry.size());
+  if (is_ahead) truth_ahead.resize(geometry.size());
   forBlocks(tracing.request.camera, [&](int begin, int end, int columns) {
     Block block;
     DirectTracer direct{tracing};
-    std::vector<TruthOfBlock> own;
     for (int i = begin; i != end; ++i) {
       const auto index = static_cast<std::size_t>(i);
       BlockGeometry& pixels = geometry[index];
@@ -129,8 +131,9 @@ void RealtimeTracer::Impl::traceDirect(const Tracing& tracing, bool is_all, bool
       prepareBlock(tracing, shape, block.x, block.y, block);
       direct.trace(block, kept, index);
       keepGeometry(block, direct.truth, pixels);
+      is_ahead_of_images[index] = is_ahead ? 1 : 0;
       if (is_ahead) {
-        own.push_back({index, direct.truth});
+        truth_ahead[index] = {direct.truth.range_m, direct.truth.albedo};
       } else {
         images.storeTruth(at, direct.truth);
       }
@@ -142,21 +145,17 @@ void RealtimeTracer::Impl::traceDirect(const Tracing& tracing, bool is_all, bool
         recall(at, index, direct);
       }
     }
-    if (own.empty()) return;
-    const std::scoped_lock lock{truths_mutex};
-    truths.push_back(std::move(own));
   });
 }
 
 void RealtimeTracer::Impl::storeTruths(const CameraInfo& camera) {
   const int columns = (camera.width + kSize - 1) / kSize;
-  for (const auto& of_blocks : truths) {
-    for (const auto& [block, truth] : of_blocks) {
-      const int i = static_cast<int>(block);
-      images.storeTruth({i % columns * kSize, i / columns * kSize, camera}, truth);
-    }
+  for (int i = 0; i != static_cast<int>(is_ahead_of_images.size()); ++i) {
+    const auto index = static_cast<std::size_t>(i);
+    if (std::exchange(is_ahead_of_images[index], 0) == 0) continue;
+    images.storeTruth({i % columns * kSize, i / columns * kSize, camera},
+                      {truth_ahead[index].range_m, truth_ahead[index].albedo, normalsOf(geometry[index])});
   }
-  truths.clear();
 }
 
 /// Puts direct light that is kept into the images, unless it is there.
@@ -301,8 +300,8 @@ void RealtimeTracer::Impl::finish() {
   }
   images.use(channels, indirect_channels);
   images.resize(request);
-  storeTruths(request.camera);
   if (!is_gathered) gather(false);
+  storeTruths(request.camera);
   // Direct light alone is to stay the same where nothing moves.
   refineJumps(scene, request, is_direct ? 0 : frame++);
   if (is_direct) return;

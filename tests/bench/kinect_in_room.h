@@ -59,6 +59,12 @@ class Kinect {
     return moment;
   }
   const Light& trace() { return *(light = &tracer.next(scene.at(time()), request, seen_)); }
+  /// Begins a frame a centimetre beside the ones before.
+  void beginElsewhere() {
+    TraceRequest elsewhere = request;
+    elsewhere.world_from_camera.translation_m.x += 0.01;
+    tracer.begin(scene.at(time()), elsewhere, seen_);
+  }
   [[nodiscard]] SensorModel::Exposed expose() const { return {{}, model.measure(*light, moment(), seed_, frame)}; }
   [[nodiscard]] Samples collect(const SensorModel& with) const {
     return with.collect(*light, moment(), seed_, frame);

@@ -133,12 +133,19 @@ Bars costs(const Files& files) {
   fmt::print("\nCold start to the first frame's light: {:.0f} ms, {:.0f} of them to load\n", cold,
              first - start);
   for (int i = 0; i < 3; ++i) kinect.trace();
-  const double bytes = static_cast<double>(bytesInUse() - loaded) / (512.0 * 424.0);
-  fmt::print("Real time: {:.0f} bytes per pixel, all cells and grids included, {} phasors\n", bytes,
-             std::ranges::count_if(kinect.light->phasors, [](const auto& image) { return !image.empty(); }));
+  const auto perPixel = [&] { return static_cast<double>(bytesInUse() - loaded) / (512.0 * 424.0); };
+  const double at_rest = perPixel();
+  // A frame that is begun while the one before is still read holds beside it what it sees anew: from elsewhere, all.
+  kinect.beginElsewhere();
+  const double bytes = perPixel();
+  kinect.tracer.finish();
+  fmt::print("Real time: {:.0f} bytes per pixel, all cells and grids included, {} phasors; {:.0f} while the camera moves\n",
+             at_rest,
+             std::ranges::count_if(kinect.light->phasors, [](const auto& image) { return !image.empty(); }),
+             bytes);
   Bars bars{{"cold start to the first frame's light, 100,000 triangles", fmt::format("{:.0f} ms", cold),
              "< 500 ms", cold < 500.0},
-            {"bytes per pixel, three frequencies", fmt::format("{:.0f}", bytes), "≤ 200", bytes <= 200.0}};
+            {"bytes per pixel, three frequencies, a moving camera", fmt::format("{:.0f}", bytes), "≤ 200", bytes <= 200.0}};
   for (const Bars& more : {reposed(kinect), costOfSamples(kinect)})
     bars.insert(bars.end(), more.begin(), more.end());
   return bars;
