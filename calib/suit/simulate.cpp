@@ -35,6 +35,7 @@ bool areSame(const sim::PathFunctions& a, const sim::PathFunctions& b) {
 /// Light of one variant's lens, modulation and paths; variants that ask for the same share it.
 struct Optics {
   sim::TraceRequest request;
+  std::vector<sim::Interference> interferences;
   bool stands_still = false;
   bool operator==(const Optics& other) const {
     const auto& a = request;
@@ -42,12 +43,14 @@ struct Optics {
     return a.camera == b.camera && a.emitters == b.emitters && a.frequencies == b.frequencies &&
            a.harmonics == b.harmonics && a.max_surfaces == b.max_surfaces &&
            a.pixel_extent == b.pixel_extent && std::ranges::equal(a.gates, b.gates, areSame) &&
-           stands_still == other.stands_still;
+           interferences == other.interferences && stands_still == other.stands_still;
   }
 };
 
-Optics opticsOf(const Case& use, const Variant& variant) {
-  Optics optics{.request = variant.model.traceRequest(), .stands_still = variant.stands_still};
+Optics opticsOf(const Case& use, const sim::Scene& scene, const Variant& variant) {
+  Optics optics{.request = variant.model.traceRequest(),
+                .interferences = variant.model.interferences(scene.foreignEmitters()),
+                .stands_still = variant.stands_still};
   optics.request.samples_per_pixel = use.spec.samples_per_pixel;
   optics.request.max_surfaces = variant.max_surfaces;
   optics.request.pixel_extent = variant.pixel_extent;
@@ -74,7 +77,7 @@ class Look {
   Look(const Case& use, const sim::Scene& scene, const StationSpec& pose, Optics optics, std::uint64_t repeat)
       : stands_still_(optics.stands_still),
         seed_(use.spec.seed + 7919 * repeat),
-        view_(scene, seeded(std::move(optics.request), seed_),
+        view_(scene, seeded(std::move(optics.request), seed_), std::move(optics.interferences),
               stands_still_ ? sim::Motion{} : motionOf(pose, 1.0)) {
     const Transform<World, Camera> there = pose.world_from_camera();
     view_.setPose(stands_still_ ? there : sim::poseAt(motionOf(pose, -1.0), there, pose.time));
@@ -241,7 +244,7 @@ class PoseRun {
         spec_(use.spec.poses[pose]),
         kept_(kept) {
     for (const Variant& variant : variants) {
-      optics_.push_back(opticsOf(use, variant));
+      optics_.push_back(opticsOf(use, scene, variant));
       if (optics_.size() > 1 && seeTheSame(optics_.size() - 2, optics_.size() - 1))
         stations_.push_back(stations_.back());
       else

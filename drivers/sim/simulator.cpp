@@ -231,8 +231,7 @@ class SimulatedSource final : public Source {
     base_ = std::move(base);
     model_ = std::move(changed);
     operating_ = std::move(operating);
-    view_.setFrequencies(model_.traceRequest().frequencies,
-                         model_.hasPhasors() ? model_.correlatedTerms() : std::vector<sim::SeenHarmonic>{});
+    view_.setModel(model_);
     info_.planes = planesNow();
     collected_.reset();
     frames_as_they_are_ = 0;
@@ -398,8 +397,10 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   chosen->keys.applyTo(request);
   if (const auto missing = sim::missingLight(chosen->scene, request.emitters, chosen->keys.mode == Mode::RealTime))
     logging::warn("{}: {}", table.place("scene"), *missing);
-  View view{std::move(chosen->scene), std::move(request), motionOf(chosen->keys), chosen->model.rowDelay()};
-  if (chosen->keys.mode == Mode::RealTime) view.goRealtime(chosen->model.correlatedTerms());
+  auto interferences = chosen->model.interferences(chosen->scene.foreignEmitters());
+  View view{std::move(chosen->scene), std::move(request), std::move(interferences), motionOf(chosen->keys),
+            chosen->model.rowDelay()};
+  if (chosen->keys.mode == Mode::RealTime) view.goRealtime(chosen->model);
   return std::unique_ptr<Source>{std::make_unique<SimulatedSource>(std::move(*chosen), std::move(view))};
 }
 

@@ -6,7 +6,6 @@
 
 #include "drivers/sim/light_seed.h"
 #include "sim/sensor/collect_moving.h"
-#include "sim/tracer/foreign.h"
 #include "sim/tracer/trace_bands.h"
 
 namespace toftwin::drivers::simulator {
@@ -14,6 +13,10 @@ namespace {
 
 constexpr int kRowsPerBand = 16;
 constexpr int kRowsPerRollingBand = 4;  // which see the same time
+
+std::vector<sim::SeenHarmonic> seenBy(const sim::SensorModel& model) {
+  return model.hasPhasors() ? model.correlatedTerms() : std::vector<sim::SeenHarmonic>{};
+}
 
 }  // namespace
 
@@ -28,14 +31,16 @@ void View::setPose(const Transform<World, Camera>& world_from_camera) {
   forget();
 }
 
-void View::setFrequencies(std::vector<Frequency> frequencies, std::vector<sim::SeenHarmonic> seen) {
-  if (frequencies == request_.frequencies && (!realtime_ || seen == seen_)) return;
-  request_.frequencies = std::move(frequencies);
+void View::setModel(const sim::SensorModel& model) {
+  const std::vector<Frequency> frequencies = model.traceRequest().frequencies;
+  if (frequencies == request_.frequencies && (!realtime_ || seen_ == seenBy(model))) return;
+  request_.frequencies = frequencies;
+  interferences_ = model.interferences(scene_.foreignEmitters());
   own_ = {};
   foreign_.assign(foreign_.size(), {});
   if (!realtime_) return;
   realtime_light_ = nullptr;
-  goRealtime(std::move(seen));
+  goRealtime(model);
 }
 
 void View::moveTo(Duration time, std::uint64_t number) {
@@ -46,10 +51,10 @@ void View::moveTo(Duration time, std::uint64_t number) {
   forget();
 }
 
-void View::goRealtime(std::vector<sim::SeenHarmonic> seen) {
+void View::goRealtime(const sim::SensorModel& model) {
   realtime_.emplace();
   begun_.reset();
-  seen_ = std::move(seen);
+  seen_ = seenBy(model);
 }
 
 sim::TraceRequest View::requestAt(Duration time) const {
@@ -69,7 +74,7 @@ void View::beginFrame(Duration time) {
   begun_ = begunAt(time);
 }
 
-bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const {
+bool View::complete(const sim::Interference* interference, Pass& pass, const std::stop_token& stop) const {
   const int height = request_.camera.height;
   const bool is_rolling = moves() && row_delay_ > Duration{};
   sim::Scene posed = moves() ? scene_.at(time_) : scene_;
@@ -85,7 +90,7 @@ bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const st
     if (moves()) band.world_from_camera = poseAt(is_rolling ? time : time_);
     // A tile of pixels that share their paths would be traced for each of its bands anew.
     if (is_rolling && band.sampler == sim::Sampler::Shared) band.sampler = sim::Sampler::Even;
-    if (foreign != nullptr) band = sim::foreignRequest(*foreign, band);
+    if (interference != nullptr) band = interference->request(band);
     sim::putBand(sim::trace(posed, band), pass.rows_done, height, pass.light);
     pass.rows_done += band.region_height;
     if (tell_) tell_(band.region_height);
@@ -96,7 +101,7 @@ bool View::complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const st
 bool View::complete(const std::stop_token& stop) {
   if (!complete(nullptr, own_, stop)) return false;
   for (std::size_t i = 0; i < foreign_.size(); ++i) {
-    if (!complete(&scene_.foreignEmitters()[i], foreign_[i], stop)) return false;
+    if (!complete(&interferences_[i], foreign_[i], stop)) return false;
   }
   return true;
 }
@@ -104,10 +109,8 @@ bool View::complete(const std::stop_token& stop) {
 const sim::Light& View::lightFor(const Exposure& exposure) {
   if (foreign_.empty()) return own_.light;
   mixed_ = own_.light;
-  for (std::size_t i = 0; i < foreign_.size(); ++i) {
-    sim::addForeignLight(scene_.foreignEmitters()[i], foreign_[i].light, exposure.modulation,
-                         sim::middleOf(exposure), exposure.duration, row_delay_, mixed_);
-  }
+  for (std::size_t i = 0; i < foreign_.size(); ++i)
+    interferences_[i].addTo(mixed_, foreign_[i].light, exposure, row_delay_);
   return mixed_;
 }
 

@@ -10,6 +10,8 @@
 #include <toftwin/frame.h>
 
 #include "sim/images/light.h"
+#include "sim/sensor/interference.h"
+#include "sim/sensor/sensor_model.h"
 #include "sim/tracer/motion.h"
 #include "sim/tracer/realtime.h"
 #include "sim/tracer/trace.h"
@@ -21,9 +23,14 @@ namespace toftwin::drivers::simulator {
 /// does not depend on it. Each pose has random numbers of its own (light_seed.h).
 class View {
  public:
-  /// `request` with everything filled in but pose and region.
-  View(sim::Scene scene, sim::TraceRequest request, sim::Motion camera = {}, Duration row_delay = {})
-      : scene_(std::move(scene)), camera_(std::move(camera)), row_delay_(row_delay), request_(std::move(request)) {}
+  /// `request` with everything filled in but pose and region; interferences with the scene's foreign emitters.
+  View(sim::Scene scene, sim::TraceRequest request, std::vector<sim::Interference> interferences, sim::Motion camera = {},
+       Duration row_delay = {})
+      : scene_(std::move(scene)),
+        camera_(std::move(camera)),
+        row_delay_(row_delay),
+        request_(std::move(request)),
+        interferences_(std::move(interferences)) {}
 
   [[nodiscard]] const sim::Scene& scene() const { return scene_; }
   /// At time 0.
@@ -33,8 +40,8 @@ class View {
   }
   void setPose(const Transform<World, Camera>& world_from_camera);
 
-  /// Looks with those frequencies from now on, of which those phasors are wanted in real time.
-  void setFrequencies(std::vector<Frequency> frequencies, std::vector<sim::SeenHarmonic> seen);
+  /// Looks from now on with the frequencies of that model, which is the same but for those and its parameters.
+  void setModel(const sim::SensorModel& model);
 
   /// Whether raw exposures see different light: scene or camera move, or another camera's light beats.
   [[nodiscard]] bool changesWithTime() const { return moves() || !scene_.foreignEmitters().empty(); }
@@ -50,8 +57,8 @@ class View {
   /// The light of the whole image, once complete() said so; in real time that of the last frame.
   [[nodiscard]] const sim::Light& light() const { return realtime_light_ != nullptr ? *realtime_light_ : own_.light; }
 
-  /// From now on light is traced frame by frame, those of its phasors that are wanted.
-  void goRealtime(std::vector<sim::SeenHarmonic> seen);
+  /// From now on light is traced frame by frame, those of its phasors that the model wants.
+  void goRealtime(const sim::SensorModel& model);
   [[nodiscard]] bool isRealtime() const { return realtime_.has_value(); }
   /// Traces the light of one frame, as it is at a time since device time 0.
   void traceFrame(Duration time);
@@ -69,6 +76,7 @@ class View {
   Duration time_{};  ///< of moveTo()
   Transform<World, Camera> pose_;
   sim::TraceRequest request_;
+  std::vector<sim::Interference> interferences_;
   std::uint64_t seed_ = request_.seed;
   /// One emitter's or camera's light, as far as it is traced.
   struct Pass {
@@ -78,7 +86,7 @@ class View {
   [[nodiscard]] bool moves() const { return scene_.moves() || !camera_.isStill(); }
   [[nodiscard]] sim::Scene sceneAt(Duration time) const { return scene_.moves() ? scene_.at(time) : scene_; }
   [[nodiscard]] sim::TraceRequest requestAt(Duration time) const;
-  bool complete(const sim::ForeignEmitterSpec* foreign, Pass& pass, const std::stop_token& stop) const;
+  bool complete(const sim::Interference* interference, Pass& pass, const std::stop_token& stop) const;
   void forget();
   std::optional<sim::RealtimeTracer> realtime_;
   std::vector<sim::SeenHarmonic> seen_;                ///< in real time

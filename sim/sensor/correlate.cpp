@@ -117,7 +117,8 @@ Light correlatedPart(const Light& light, const std::vector<Response>& responses,
     part.phasors.resize(light.phasors.size());
     const std::vector<Harmonic> seen = correlatedTerms(responses, light.harmonics);
     for (std::size_t term = 0; term < seen.size(); ++term) {
-      if (seen[term] != Harmonic::Unseen) part.phasors[term] = light.phasors[term];
+      const bool is_added = term < light.error.content.size() && light.error.content[term] != std::complex<float>{};
+      if (seen[term] != Harmonic::Unseen || is_added) part.phasors[term] = light.phasors[term];
     }
   }
   part.steady = light.steady;

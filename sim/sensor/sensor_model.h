@@ -25,6 +25,9 @@
 
 namespace toftwin::sim {
 
+class Interference;
+struct ForeignEmitterSpec;
+
 /// How a camera that demodulates takes its frames: what a device's own firmware may be told while it runs.
 struct Operation {
   int frequencies = 1;                        ///< one to three
@@ -83,6 +86,9 @@ class SensorModel {
   /// What the tracer must give for this camera: lens, emitters, frequencies and harmonics filled
   /// in; pose, sample count, surfaces, region and seed are the caller's.
   [[nodiscard]] TraceRequest traceRequest() const;
+
+  /// How other cameras' light interferes with this one (interference.h).
+  [[nodiscard]] std::vector<Interference> interferences(const std::vector<ForeignEmitterSpec>& emitters) const;
 
   /// By how much noise moves the mean of the ranges there, over their variance (1/m): a factory's table of a
   /// cyclic error is not straight. E g(c + n) ≈ g + ½ g″ σ², so ½ g″/g′² of what it gives; of several

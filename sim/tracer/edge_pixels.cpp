@@ -24,7 +24,7 @@ struct Seen {
   float steady;
   float lit;  ///< what arrives there, so to speak: `steady` by the albedo; negative where there is no surface
 };
-using Corners = std::array<const Seen*, 4>;  ///< of a pixel
+using SeenCorners = std::array<const Seen*, 4>;  ///< of a pixel
 
 /// Adds direct light of sixteen paths from the camera on; those that meet nothing are no longer valid.
 void traceDirect(const Tracing& tracing, Packet& packet, Hits& hits, LaneSums& sums) {
@@ -95,7 +95,7 @@ void traceEdge(const Tracing& tracing, const Block& block, std::size_t lane, int
   }
 }
 
-bool differ(const Corners& corners) {
+bool differ(const SeenCorners& corners) {
   constexpr float kAlike = 0.25f;  // of the brightest: what a slanted or distant surface may vary by
   float brightest = 0.0f, most = 0.0f;
   for (const Seen* one : corners) {
@@ -113,7 +113,7 @@ struct RangeVariance {
 
   /// Direct light anywhere between the corners' least and most, as an edge or a slope leaves it: with even odds the mean
   /// of 1 / light² is one over their product.
-  void add(const Corners& corners, float brightest) {
+  void add(const SeenCorners& corners, float brightest) {
     constexpr double kIndirect = 0.125;  // of direct light: what other surfaces add everywhere, as in rooms
     double least = brightest, most = -1.0;
     for (const Seen* corner : corners) {
@@ -157,7 +157,7 @@ void lookAtCorners(const Tracing& tracing, Tile& tile) {
       if (block.is_inside[i] == 0) continue;
       const int column = block.x - left + static_cast<int>(i) % kBlockSide,
                 row = block.y - top + static_cast<int>(i) / kBlockSide;
-      const Corners corners{at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)};
+      const SeenCorners corners{at(column, row), at(column + 1, row), at(column, row + 1), at(column + 1, row + 1)};
       tile.edges[b][i] = differ(corners) ? -1 : 0;
       variance.add(corners, brightest);
     }

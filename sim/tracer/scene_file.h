@@ -203,6 +203,8 @@ struct AmbientSpec {
 
 /// The light of another camera, or of any modulated lamp, that stands still in the scene.
 struct ForeignEmitterSpec {
+  enum class Wave { LikeCamera, Sine, Square, ClippedSine };
+
   std::string name;
   std::array<double, 3> position_m{};
   std::array<double, 3> axis{0.0, 0.0, 1.0};
@@ -212,6 +214,9 @@ struct ForeignEmitterSpec {
   Angle half_angle = 90.0 * degree;
   bool isotropic = false;
   Frequency frequency = 20_MHz;
+  Wave emitted = Wave::LikeCamera;
+  double duty = 0.5, clip = 0.75;
+  Duration rise = 0_ns;
   double modulation = 1.0;
   Angle phase{};
   bool operator==(const ForeignEmitterSpec&) const = default;
@@ -228,10 +233,15 @@ struct ForeignEmitterSpec {
     v.quantity("half_angle", half_angle, degree, {0.1, 90.0}, "no light outside this cone");
     v.flag("isotropic", isotropic, "the same in all directions instead, power / 4 pi");
     v.quantity("frequency", frequency, megahertz, {0.001, 1000.0}, "of its modulation");
+    v.choice("emitted", emitted,
+             {std::pair{"like_camera", Wave::LikeCamera}, std::pair{"sine", Wave::Sine}, std::pair{"square", Wave::Square},
+              std::pair{"clipped_sine", Wave::ClippedSine}},
+             "its waveform; like_camera: that of the camera which sees it, for a camera of the same kind");
+    v.number("emitted_duty", duty, {0.001, 0.99}, "square: share of the period that is on");
+    v.number("emitted_clip", clip, {0.05, 1.0}, "clipped_sine: cut at this share of the amplitude");
+    v.quantity("rise", rise, nanosecond, {0.0, 1000.0}, "time constant of its low pass, not with like_camera");
     v.number("modulation", modulation, {0.0, 1.0},
-             "amplitude of its fundamental relative to that of the camera's own light: 1 for a camera of the "
-             "same kind, 0 for light "
-             "that is not modulated");
+             "how much of the waveform's modulation it has: 1 all of it, 0 light that is not modulated");
     v.quantity("phase", phase, degree, {-360.0, 360.0}, "of its modulation at device time 0");
   }
 };

@@ -341,6 +341,32 @@ TEST_F(Simulator, ARollingShutterSeesEachBandOfRowsAtItsOwnTime) {
   }
 }
 
+/// Another camera of the same kind beside this one, 2 Hz from its frequency: from frame to frame (33.3 ms) its beat turns by
+/// 24 degrees; through 15 frames it goes round once. A square wave at a third of the frequency has nothing there but its
+/// third harmonic, a third of that: the ranges swing as much less. What is not modulated is charge alone.
+TEST_F(Simulator, OtherCamerasMakeRangesSwing) {
+  const auto swing = [&](const std::string& other) {
+    std::ofstream{folder_ / "two.toml"} << kWall << "[[foreign_emitter]]\nposition_m = [0.1, 0, 0]\npower_w = 0.01\n" << other;
+    std::string camera{kCamera};
+    camera.resize(camera.find("[[effect]]"));
+    std::ofstream{folder_ / "quiet.toml"} << camera << "[sampling]\nharmonics = 1\nframe_interval_ms = 33.333333\n";
+    auto source = tryOpen("camera = 'quiet.toml'\nscene = 'two.toml'\npace = 'fast'\nmax_surfaces = 1\n");
+    if (!source) throw std::runtime_error{source.error().message};
+    EXPECT_TRUE((*source)->start());
+    double least = 1e9, most = -1e9;
+    for (int i = 0; i < 15; ++i) {
+      const double mean = meanRange(frameOf(**source));
+      least = std::min(least, mean);
+      most = std::max(most, mean);
+    }
+    return most - least;
+  };
+  const double same = swing("frequency_mhz = 20.000002\nemitted = 'square'\n");
+  EXPECT_GT(same, 1e-3);
+  EXPECT_NEAR(swing("frequency_mhz = 6.6666673333333\nemitted = 'square'\n") / same, 1.0 / 3.0, 0.01);
+  EXPECT_LT(swing("frequency_mhz = 20.000002\nmodulation = 0\n"), 1e-6);
+}
+
 /// A corner, whose light over both walls makes it seem 16 mm further. An image so small has a coarse grid of 7 × 6
 /// points, over which light is blurred: 4 mm.
 TEST_F(Simulator, InRealtimeSeesWhatTheUnbiasedModeSees) {

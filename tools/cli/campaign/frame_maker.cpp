@@ -22,7 +22,7 @@ Duration durationOf(DeviceTime time) { return static_cast<double>(time.ns) * nan
 
 }  // namespace
 
-FrameMaker::FrameMaker(sim::SensorModel model, sim::Scene scene, Trajectory trajectory,
+FrameMaker::FrameMaker(sim::SensorModel model, const sim::Scene& scene, Trajectory trajectory,
                        const Transform<World, Camera>& pose, Schedule schedule, RenderSettings settings,
                        std::vector<PlaneKind> planes, std::string source)
     : model_(std::move(model)),
@@ -32,7 +32,7 @@ FrameMaker::FrameMaker(sim::SensorModel model, sim::Scene scene, Trajectory traj
       settings_(std::move(settings)),
       planes_(std::move(planes)),
       source_(std::move(source)),
-      view_(std::move(scene), requestFor(model_, settings_.keys), motion(),
+      view_(scene, requestFor(model_, settings_.keys), model_.interferences(scene.foreignEmitters()), motion(),
             settings_.freeze ? Duration{} : model_.rowDelay()) {}
 
 sim::Motion FrameMaker::motion() const {

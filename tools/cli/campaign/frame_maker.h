@@ -39,7 +39,7 @@ struct FrameMemory {
 class FrameMaker {
  public:
   /// `pose` where the trajectory is empty.
-  FrameMaker(sim::SensorModel model, sim::Scene scene, Trajectory trajectory,
+  FrameMaker(sim::SensorModel model, const sim::Scene& scene, Trajectory trajectory,
              const Transform<World, Camera>& pose, Schedule schedule, RenderSettings settings,
              std::vector<PlaneKind> planes, std::string source);
 
