@@ -12,14 +12,15 @@
 namespace toftwin::compare {
 namespace {
 
-/// The effects without which a fit gets much worse, each with the data that show it.
-std::string whatCounts(const std::vector<Finding>& findings) {
-  constexpr double kMuch = 1.5;
+/// Effects whose ratio of what is left without and with them is wanted, each with the data that show it.
+template <class IsWanted>
+std::string named(const std::vector<Finding>& findings, const IsWanted& isWanted) {
   std::vector<std::pair<std::string, std::string>> effects;  // and where, in the order of the table
   for (const Finding& finding : findings) {
     for (const Ablation& a : finding.ablations) {
-      if (!(a.without >= kMuch * a.with)) continue;
-      const std::string where = fmt::format("{} {}", a.data, shown(a.without / a.with));
+      const double ratio = a.without / a.with;
+      if (!isWanted(ratio)) continue;
+      const std::string where = fmt::format("{} {}", a.data, shown(ratio, ratio < 1.0 ? 2 : 1));
       const auto known = std::find_if(effects.begin(), effects.end(),
                                       [&](const auto& effect) { return effect.first == a.effect; });
       if (known == effects.end()) {
@@ -32,10 +33,29 @@ std::string whatCounts(const std::vector<Finding>& findings) {
   std::string words;
   for (const auto& [effect, where] : effects)
     words += fmt::format("{}{} ({})", words.empty() ? "" : ", ", effect, where);
-  return words.empty() ? fmt::format("No effect left out makes a fit {} times worse.", kMuch)
-                       : fmt::format("One effect left out, the rest fitted again, so many times "
-                                     "worse (from {} on): {}.",
-                                     kMuch, words);
+  return words;
+}
+
+/// The effects without which a fit gets much worse, and what speaks against the model: effects without which it gets
+/// better, and data on which the fit is worse than no fit.
+std::string whatCounts(const std::vector<Finding>& findings) {
+  constexpr double kMuch = 1.5;
+  const std::string much = named(findings, [](double ratio) { return ratio >= kMuch; });
+  std::string words = much.empty() ? fmt::format("No effect left out makes a fit {} times worse.", kMuch)
+                                   : fmt::format("One effect left out, the rest fitted again, so many times "
+                                                 "worse (from {} on): {}.",
+                                                 kMuch, much);
+  const std::string better = named(findings, [](double ratio) { return ratio < 0.995; });
+  if (!better.empty()) words += fmt::format(" Better without: {}.", better);
+  std::string worse;
+  for (const Finding& finding : findings) {
+    for (const Outcome& o : finding.outcomes) {
+      if (!(o.fitted_mm > o.as_is_mm)) continue;
+      worse += fmt::format("{}{} ({} for {})", worse.empty() ? "" : ", ", o.data, shown(o.fitted_mm), shown(o.as_is_mm));
+    }
+  }
+  if (!worse.empty()) words += fmt::format(" The judged half is met worse by the fitted model than by the preset as is: {}.", worse);
+  return words;
 }
 
 }  // namespace

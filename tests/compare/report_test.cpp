@@ -311,10 +311,14 @@ TEST(Documents, ResultsAreAReportOfThisProgramsForm) {
 TEST(Summary, NamesTheEffectsThatCount) {
   Finding a, b;
   a.ablations = {{"multipath", "corner", 4.0, 10.0}, {"delay", "corner", 4.0, 5.9}};
-  b.ablations = {{"multipath", "box", 2.0, 3.0}, {"scatter", "plate", 1.0, 5.0}};
+  b.ablations = {{"multipath", "box", 2.0, 3.0}, {"scatter", "plate", 1.0, 5.0}, {"defocus", "edge", 2.0, 1.1}};
+  a.outcomes = {{.data = "corner", .as_is_mm = 6.0, .fitted_mm = 4.0}};
+  b.outcomes = {{.data = "edge", .as_is_mm = 1.6, .fitted_mm = 2.0}};
   const Section section = summarySection({a, b});
   EXPECT_THAT(std::get<Paragraph>(section.blocks.at(2)).text,
-              HasSubstr("(from 1.5 on): multipath (corner 2.5; box 1.5), scatter (plate 5.0)."));
+              AllOf(HasSubstr("(from 1.5 on): multipath (corner 2.5; box 1.5), scatter (plate 5.0). Better"),
+                    HasSubstr("Better without: defocus (edge 0.55). The judged"),
+                    HasSubstr("than by the preset as is: edge (2.0 for 1.6).")));
 }
 
 }  // namespace
