@@ -7,6 +7,8 @@
 #include <cmath>
 #include <filesystem>
 #include <fstream>
+#include <regex>
+#include <set>
 #include <sstream>
 
 #include <gmock/gmock.h>
@@ -291,6 +293,33 @@ TEST(Documents, ReadmesResultsAreThoseOfTheReportThatIsCommitted) {
   EXPECT_NE(results.find(copy), std::string::npos)
       << "README.md holds other results than docs/results.md:\n"
       << copy;
+}
+
+/// Each number that the page says was measured or simulated stands in the results.
+TEST(Documents, PublishedErrorsStandBesideFiguresOfTheResults) {
+  const std::string page = textOf("docs/published-errors.md"), results = textOf("docs/results.md");
+  const std::regex number{"(−)?[0-9]+(\\.[0-9]+)?"};
+  const auto numbersOf = [&](const std::string& text) {
+    std::set<std::string> numbers;
+    for (std::sregex_iterator i{text.begin(), text.end(), number}, end; i != end; ++i) numbers.insert(i->str());
+    return numbers;
+  };
+  const std::set<std::string> known = numbersOf(results);
+  std::istringstream lines{page.substr(page.find("<!-- figures of docs/results.md -->"))};
+  int count = 0;
+  for (std::string line; std::getline(lines, line) && line != "<!-- end -->";) {
+    std::vector<std::string> cells;
+    std::istringstream row{line};
+    for (std::string cell; std::getline(row, cell, '|');) cells.push_back(cell);
+    if (cells.size() < 7 || cells[4] == " measured ") continue;
+    for (std::size_t column = 4; column < 7; ++column) {
+      for (const std::string& one : numbersOf(cells[column])) {
+        EXPECT_TRUE(known.contains(one)) << one << " of: " << line;
+        ++count;
+      }
+    }
+  }
+  EXPECT_GT(count, 50);
 }
 
 TEST(Documents, ResultsAreAReportOfThisProgramsForm) {
