@@ -34,7 +34,7 @@ std::vector<PlaneKind> chosenPlanes(const Keys& keys, settings::Table& table) {
       std::string known;
       for (PlaneKind plane : all) known += (known.empty() ? "" : ", ") + std::string{nameOf(plane)};
       table.complain("planes",
-                     fmt::format("names \"{}\", but a simulated camera has only: {}", name, known));
+                     fmt::format("names \"{}\", but a simulated camera has only: {}{}", name, known, otherWordFor(name)));
     } else if (std::ranges::find(chosen, *kind) == chosen.end()) {
       chosen.push_back(*kind);
     }

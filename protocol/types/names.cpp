@@ -48,6 +48,20 @@ std::string_view find(const Names& names, Value value) {
   return "unknown";
 }
 
+/// Words of other cameras and of their programs.
+constexpr std::pair<std::string_view, std::string_view> kOtherWords[]{
+    {"confidence", "flags, and exposure where a frame takes several"},
+    {"infrared", "amplitude"},
+    {"ir", "amplitude"},
+    {"intensity", "amplitude"},
+    {"distance", "range"},
+    {"raw", "samples"},
+    {"phase", "phasors"},
+    {"normal", "truth_normal"},
+    {"rgb", "color"},
+    {"colour", "color"},
+};
+
 }  // namespace
 
 std::string_view nameOf(PlaneKind kind) { return find(kPlaneNames, kind); }
@@ -59,6 +73,13 @@ std::optional<PlaneKind> planeKindNamed(std::string_view name) {
     if (name == known) return kind;
   }
   return std::nullopt;
+}
+
+std::string otherWordFor(std::string_view plane) {
+  for (const auto& [word, ours] : kOtherWords) {
+    if (plane == word) return "; what others call \"" + std::string{word} + "\" is " + std::string{ours} + " here";
+  }
+  return {};
 }
 
 }  // namespace toftwin

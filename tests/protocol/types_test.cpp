@@ -79,6 +79,8 @@ TEST(Names, EveryPlaneKindComesBackFromItsName) {
     EXPECT_EQ(planeKindNamed(nameOf(kind)), kind);
   }
   EXPECT_EQ(planeKindNamed("distance"), std::nullopt);
+  EXPECT_EQ(otherWordFor("distance"), "; what others call \"distance\" is range here");
+  EXPECT_EQ(otherWordFor("range"), "");
 }
 
 }  // namespace

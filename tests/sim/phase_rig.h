@@ -25,7 +25,7 @@ struct PhaseRig {
   Moment moment{};
 
   [[nodiscard]] SensorModel model() const {
-    return modelOf("[lens]\nwidth = 360\nheight = 1\n[[emitter]]\n[[modulation]]\nfrequency_mhz = " +
+    return modelOf("[lens]\nwidth = 360\nheight = 1\ncy = 0\n[[emitter]]\n[[modulation]]\nfrequency_mhz = " +
                    std::to_string(frequency_mhz) + "\nexposure_us = 1000\ncontrast = " + "0.5\n" +
                    modulation + "[sampling]\nfactory_calibration = 'none'\nsteps = " +
                    std::to_string(steps) + "\ntaps = " + std::to_string(taps) +

@@ -64,6 +64,7 @@ TEST(Toftwin, AWrongCommandLineIsStatus2AndSaysWhatIsWrong) {
            {"grab kinect -o a.png --region 0,0,0,0", "0 × 0 pixels are none"},
            {"grab kinect -o a.png -p range,flags", "takes one plane"},
            {"replay a.mcap -o a.ply -p range,flags", "takes one plane"},
+           {"grab kinect -o a.png -p ir", "what others call \"ir\" is amplitude here"},
            {"record kinect o3d kinect -o a.mcap", "kinect is named twice"},
            {"list -a localhost:99999", "99999"},
            {"info kinect --text", "--text goes with preset:NAME"},
@@ -135,6 +136,13 @@ TEST(Toftwin, ADaemonThatIsNotThereIsStatus3) {
   }
   EXPECT_FALSE(std::filesystem::exists("/tmp/never.mcap"));
   EXPECT_EQ(runShell("TOFTWIN_ADDRESS=unix:/no/such/socket '" TOFTWIN_PROGRAM "' list").status, 3);
+}
+
+TEST(Toftwin, APresetsNameAloneIsToldHowItIsWritten) {
+  const Ran ran = toftwin("info o3d303 -a localhost:1");
+  EXPECT_EQ(ran.status, 3);
+  EXPECT_THAT(ran.err, HasSubstr("toftwin info preset:o3d303"));
+  EXPECT_EQ(toftwin("info preset:o3d303").status, 0);
 }
 
 TEST(Toftwin, WhatIsNotThereIsStatus4) {

@@ -197,7 +197,13 @@ Result<Exit> run(const Options& options) {
   if (options.text) return printPreset(options.what);
   if (path.extension() == ".toml" || options.what.starts_with(kPreset))
     return describeCamera(options);
-  return describeSource(options);
+  auto described = describeSource(options);
+  const std::vector<std::string> presets = sim::SensorModel::presetNames();
+  if (described || std::ranges::find(presets, options.what) == presets.end()) return described;
+  Error error = described.error();
+  error.message += fmt::format(". The simulator's camera of this name is {}{}: toftwin info {}{}", kPreset, options.what,
+                               kPreset, options.what);
+  return error;
 }
 
 }  // namespace info_command

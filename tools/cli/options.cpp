@@ -137,7 +137,8 @@ Result<> OutputOptions::check(const std::vector<Format>& formats) {
     const auto kind = planeKindNamed(name);
     if (!kind) {
       return Error{Error::Code::InvalidArgument,
-                   fmt::format("there is no plane \"{}\"; the planes are: {}", name, planeNames())};
+                   fmt::format("there is no plane \"{}\"; the planes are: {}{}", name, planeNames(),
+                               otherWordFor(name))};
     }
     how.planes.push_back(*kind);
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include <toftwin/frame.h>
@@ -15,5 +16,8 @@ std::string_view nameOf(PixelFlag flag);
 
 /// The value of a word, or nothing.
 std::optional<PlaneKind> planeKindNamed(std::string_view name);
+
+/// For who asks for a plane by another camera's word: "" or `; what others call "ir" is amplitude here`.
+std::string otherWordFor(std::string_view plane);
 
 }  // namespace toftwin
