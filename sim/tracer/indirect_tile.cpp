@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint32_t kBounce = 0x10000, kPick = kBounce + 2, kRoulette = kBounce + 3;
 /// A tile looks a surface further, for the cells, in one of so many frames once three quarters of those it asks know so
 /// many samples, and all of them any. (Cells that remember fewer never do: where the camera moves fast.)
-constexpr std::uint32_t kTurnsToLookFurther = 2;
+constexpr std::uint32_t kTurnsToLookFurther = 3;
 constexpr int kManySamples = 96;
 /// Of direct light that lit places leave less than this share of, so much is left to chance that what survives has this share:
 /// away from corners that is nearly all, and what is dropped needs no ray to the emitter.
@@ -195,18 +195,21 @@ void TileGatherer::lookAtLights(const Lanes<int>& valid) {
   forEachChannel(fallen_, [&](std::size_t channel, const Lanes<float>& lanes) { tile_.lit[channel] = lanes; });
 }
 
-/// One of the lit points, picked by its share, says whether it is seen from here: in turns of those that a mover is
-/// expected to be in the way of, and of the others. Neighbours have other turns, so that in each frame both are mended
-/// around every place.
+/// One of the lit points, picked by its share, says whether it is seen from here: in one of four turns of those that
+/// are expected to arrive in part, in the others of those that nothing is expected to be in the way of. Neighbours have
+/// other turns, so that in each frame both are mended around every place.
 void TileGatherer::mendLights(const Packet& packet, std::uint32_t sample, const Hits& seen) {
   LitPoints::Pick pick;
   Lanes<float> draws;
   Lanes<int> is_other;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const std::uint32_t turn = sample + static_cast<std::uint32_t>(i % 4 + i / 4);
-    const RandomPair draw = randomPair(packet.key(i), numberInSequence(turn / 2, i), kPick);
-    is_other[i] = static_cast<int>(turn & 1U);
-    draws[i] = (turn & 1U) != 0 ? draw.v : draw.u;
+    const bool is_behind = turn % LitPoints::kTurns == 0;
+    // Each kind goes on in its own sequence.
+    const std::uint32_t number = is_behind ? turn / LitPoints::kTurns : turn - turn / LitPoints::kTurns - 1;
+    const RandomPair draw = randomPair(packet.key(i), numberInSequence(number, i), kPick);
+    is_other[i] = is_behind ? 1 : 0;
+    draws[i] = is_behind ? draw.v : draw.u;
   }
   lights_.pick(shares_, draws, is_other, pick);
   Vec3Lanes places;

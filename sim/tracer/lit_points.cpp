@@ -100,10 +100,11 @@ void LitPoints::takeBalls(const Tracing& tracing) {
   balls_.clear();
   for (std::size_t m = 0; m < tracing.scene.poses.size(); ++m) {
     const Standing& standing = tracing.scene.poses[m];
-    if (standing.hides < kLeastHidden) continue;
+    if (standing.hides.all < kLeastHidden) continue;
     const Vec3d c = standing.middle();
     balls_.push_back({static_cast<float>(c.x), static_cast<float>(c.y), static_cast<float>(c.z),
-                      static_cast<float>(standing.radius), static_cast<float>(1.0 - standing.hides),
+                      static_cast<float>(standing.radius), static_cast<float>(standing.hides.core),
+                      static_cast<float>(1.0 - standing.hides.rim),
                       static_cast<int>(m) + 1});
   }
   std::ranges::stable_sort(balls_, std::ranges::greater{}, &Ball::radius);
@@ -172,7 +173,8 @@ void LitPoints::takeOf(const Tracing& tracing, const Channels& channels, const P
 
 namespace {
 
-/// Where the ball is between a place and the receivers, less arrives; not where either is on what is in it.
+/// Where the ball is between a place and the receivers, less arrives, and nothing where its core is and neither is inside
+/// the ball; not where either is on what is in it.
 TOFTWIN_INLINE void hide(const LitPoints::Receivers& receivers, const Vec3fLanes& position, const Lanes<int>& mover,
                          const LitPoints::Ball& of, Lanes<float>& open) {
   const LitPoints::Ball ball = of;
@@ -183,9 +185,12 @@ TOFTWIN_INLINE void hide(const LitPoints::Receivers& receivers, const Vec3fLanes
     const float along = (mx * dx + my * dy + mz * dz) / (dx * dx + dy * dy + dz * dz + 1e-12f);
     const float above = along > 0.0f ? along : 0.0f, t = above < 1.0f ? above : 1.0f;
     const float bx = mx - t * dx, by = my - t * dy, bz = mz - t * dz;
-    const bool is_between = (bx * bx + by * by + bz * bz < ball.radius * ball.radius) & (mover[i] != ball.mover) &
-                            (receivers.mover[i] != ball.mover);
-    open[i] = is_between ? open[i] * ball.open : open[i];
+    const float nearest = bx * bx + by * by + bz * bz, square = ball.radius * ball.radius;
+    const bool is_between = (nearest < square) & (mover[i] != ball.mover) & (receivers.mover[i] != ball.mover);
+    const float ex = mx - dx, ey = my - dy, ez = mz - dz;
+    const bool are_outside = (mx * mx + my * my + mz * mz >= square) & (ex * ex + ey * ey + ez * ez >= square);
+    const float through = (nearest < ball.core * ball.core) & are_outside ? 0.0f : ball.open;
+    open[i] = is_between ? open[i] * through : open[i];
   }
 }
 
@@ -217,7 +222,7 @@ bool weighOne(const LitPoints::Receivers& receivers, const LitPoints::Place& pla
     const float light = share[i] * steady[i];
     total[i] += light * open[i];
     clear[i] += open[i] == 1.0f ? light : 0.0f;
-    behind[i] += open[i] == 1.0f ? 0.0f : light;
+    behind[i] += (open[i] == 1.0f) | (open[i] == 0.0f) ? 0.0f : light;
   }
   shares.total = total;
   shares.clear = clear;
@@ -233,7 +238,7 @@ void pickBy(const Lanes<float>& share, const Lanes<float>& steady, const Lanes<f
             const Lanes<int>& is_behind, int number, Lanes<float>& left, Lanes<int>& picked) {
 #pragma GCC unroll 1
   for (std::size_t i = 0; i < kLaneCount; ++i) {
-    const bool is_of_kind = (open[i] != 1.0f) == (is_behind[i] != 0);
+    const bool is_of_kind = ((open[i] != 1.0f) == (is_behind[i] != 0)) & (open[i] != 0.0f);
     const float part = is_of_kind ? share[i] * steady[i] : 0.0f;
     const bool is_left = left[i] > 0.0f;
     left[i] -= is_left ? part : 0.0f;
@@ -292,13 +297,14 @@ void LitPoints::add(const Tracing& tracing, const Channels& channels, const Shar
 }
 
 void LitPoints::pick(const Shares& shares, const Lanes<float>& draws, const Lanes<int>& is_other, Pick& pick) const {
+  constexpr float kOfBehind = kTurns, kOfClear = kOfBehind / (kOfBehind - 1.0f);
   Lanes<float> left;
   Lanes<int> is_behind;
   for (std::size_t i = 0; i < kLaneCount; ++i) {
     const bool are_both = (shares.clear[i] > 0.0f) & (shares.behind[i] > 0.0f);
     is_behind[i] = are_both ? is_other[i] : shares.behind[i] > 0.0f ? 1 : 0;
     const float all = is_behind[i] != 0 ? shares.behind[i] : shares.clear[i];
-    pick.steady[i] = are_both ? 2.0f * all : all;
+    pick.steady[i] = are_both ? (is_behind[i] != 0 ? kOfBehind : kOfClear) * all : all;
     pick.point[i] = -1;
     // Not quite the total, so that rounding cannot leave the last of them out.
     left[i] = draws[i] * all * 0.999999f + 1e-30f;

@@ -12,8 +12,8 @@ namespace toftwin::sim {
 /// directions that it shines into, and what they meet sends its light on to every coarse point.
 ///
 /// Each of the sixteen points of a tile has 64 lit points of its own, evenly spread by themselves; others in
-/// every frame. Light is expected to arrive where no mover's ball is in its way, and in part where one is: one ray to
-/// one of them, picked by its share, says what was expected wrongly. Near a corner a lit point's share grows with 1/r²:
+/// every frame. Light is expected to arrive where no mover's ball is in its way, in part where one is, and not where the
+/// ball's core is: one ray to one of the former, picked by its share, says what was expected wrongly. Near a corner a lit point's share grows with 1/r²:
 /// by multiple importance sampling it leaves that to directions drawn by the cosine.
 class LitPoints {
  public:
@@ -33,11 +33,11 @@ class LitPoints {
   struct Shares {
     std::vector<Lanes<float>> share;
     std::vector<Lanes<float>> way;
-    std::vector<Lanes<float>> open;     ///< what is expected to arrive: less than 1 where a mover's ball is in the way
+    std::vector<Lanes<float>> open;  ///< what is expected to arrive: part where a mover's ball is in the way, 0 where its core
     std::vector<std::size_t> lighting;  ///< those that light any of the receivers
     Lanes<float> total;                 ///< of steady radiance that is expected to arrive
     Lanes<float> clear;   ///< of the steady radiance of points that nothing is expected to hide
-    Lanes<float> behind;  ///< of that of the others, whether it arrives or not
+    Lanes<float> behind;  ///< of that of those that are expected to arrive in part, whether they do or not
   };
   /// Sixteen lit points, one for each point of a tile.
   struct Place {
@@ -49,7 +49,8 @@ class LitPoints {
   /// A moving object, as what is between points and receivers is expected to be hidden by it.
   struct Ball {
     float x, y, z, radius;
-    float open;  ///< share of what goes through it
+    float core;  ///< radius within which nothing goes through
+    float open;  ///< share of what goes through the rest of it
     int mover;
   };
   void weigh(const Receivers& receivers, int directions, Shares& shares) const;
@@ -60,9 +61,11 @@ class LitPoints {
     Lanes<int> point;     ///< −1: there is no light
     Lanes<float> steady;  ///< radiance of all that it stands for
   };
+  /// Of so many picks one has `is_other`.
+  static constexpr std::uint32_t kTurns = 4;
   /// Picks by shares of the total, from numbers in [0, 1), among those that nothing is expected to be in the way of, or
-  /// the others where `is_other`. Where there are both, each pick stands for two samples' of its kind; where there is
-  /// one, that is picked.
+  /// those that are expected to arrive in part where `is_other`. Where there are both, each pick stands for as many
+  /// samples as there are turns for one of its kind; where there is one, that is picked.
   void pick(const Shares& shares, const Lanes<float>& draws, const Lanes<int>& is_other, Pick& pick) const;
   void placesOf(const Pick& pick, Vec3Lanes& places) const;
   /// Makes up for what was expected wrongly, by whether the picked ones are blocked. `room` is for a number of each

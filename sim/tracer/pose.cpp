@@ -69,12 +69,12 @@ double radiusOf(const BuiltObject& own, const RTCBounds& box) {
   return radius;
 }
 
-double hidesOf(RTCScene mover, const RTCBounds& box, double radius) {
-  constexpr std::uint32_t kLines = 1024;
+Hiding hidesOf(RTCScene mover, const RTCBounds& box, double radius) {
+  constexpr std::uint32_t kLines = 4096, kEnough = 256;
   const auto d = [](float v) { return static_cast<double>(v); };
   const Vec3d middle = middleOf(box);
   const PixelKey key = pixelKey(seedKey(0), 0, 0);
-  std::uint32_t met = 0;
+  std::vector<std::pair<double, bool>> lines;  // how far from the middle, and whether it meets anything
   for (std::uint32_t i = 0; i < kLines; ++i) {
     const RandomPair way = randomPair(key, i, 0), beside = randomPair(key, i, 1);
     const auto point = [](double along, double turns) {
@@ -83,7 +83,8 @@ double hidesOf(RTCScene mover, const RTCBounds& box, double radius) {
     };
     const Vec3d direction = point(1.0 - 2.0 * d(way.u), d(way.v));
     const Basis across = basisAround(direction);
-    const Vec3d off = point(0.0, d(beside.v)) * (radius * std::sqrt(d(beside.u)));
+    const double away = radius * std::sqrt(d(beside.u));
+    const Vec3d off = point(0.0, d(beside.v)) * away;
     const Vec3d from = middle + across.x * off.x + across.y * off.y - direction * (1.01 * radius);
     RTCRay ray{};
     ray.org_x = static_cast<float>(from.x), ray.org_y = static_cast<float>(from.y),
@@ -93,9 +94,18 @@ double hidesOf(RTCScene mover, const RTCBounds& box, double radius) {
     ray.tfar = static_cast<float>(2.02 * radius);
     ray.mask = 0xffffffffu;
     embree::occluded(mover, ray);
-    met += ray.tfar < 0.0f ? 1 : 0;
+    lines.emplace_back(away, ray.tfar < 0.0f);
   }
-  return static_cast<double>(met) / kLines;
+  std::ranges::sort(lines);
+  const auto met = [&](auto from) {
+    return static_cast<double>(std::count_if(from, lines.end(), [](const auto& line) { return line.second; }));
+  };
+  const auto passes = std::ranges::find(lines, false, &std::pair<double, bool>::second);
+  const bool has_core = passes - lines.begin() >= kEnough;
+  const auto first = has_core ? passes : lines.begin();
+  return {.all = met(lines.begin()) / kLines,
+          .core = !has_core ? 0.0 : passes == lines.end() ? radius : passes->first,
+          .rim = first == lines.end() ? 0.0 : met(first) / static_cast<double>(lines.end() - first)};
 }
 
 void placeMovers(Scene::Impl& scene, const Scene::Impl& loaded, Duration time) {

@@ -13,7 +13,8 @@ void addPlanes(BuiltObject& object);
 double reachOf(const BuiltObject& own);
 /// Radius of a ball around it, whose middle is that of its box in its own frame.
 double radiusOf(const BuiltObject& own, const RTCBounds& box);
-/// Share of the lines through that ball that meet what is in it; not of glass.
-double hidesOf(RTCScene mover, const RTCBounds& box, double radius);
+/// Of lines drawn through that ball; not of glass. Something that lets less than a thousandth of the lines near its middle
+/// through may pass for one that lets none.
+Hiding hidesOf(RTCScene mover, const RTCBounds& box, double radius);
 
 }  // namespace toftwin::sim

@@ -48,6 +48,13 @@ struct BuiltObject {
   const bsdf::ThinGlass* glass = nullptr;  ///< if it is one: shadow rays go through
 };
 
+/// What a moving object is in the way of, of the lines through the ball around it.
+struct Hiding {
+  double all = 0.0;   ///< share that meet it
+  double core = 0.0;  ///< radius of a ball around the same middle: all lines through that one do, m
+  double rim = 0.0;   ///< share of those beside the core that meet it
+};
+
 /// Where a moving object stands. Its geometry stays in its own frame: rays are taken there, and what they
 /// meet is taken back.
 struct Standing {
@@ -58,7 +65,7 @@ struct Standing {
   std::array<Vec3d, 3> axes;  ///< of the object, in the scene
   Vec3f lower, upper;         ///< the box around it, in its own frame
   double radius = 0.0;        ///< of the ball around it whose middle is the box's, m
-  double hides = 0.0;         ///< share of the lines through that ball that meet it
+  Hiding hides{};
   double blur = 0.0;          ///< bound on what rounding moves rays by that are taken there, m
   bool is_paired = false;     ///< as its object
 
@@ -84,7 +91,7 @@ struct Mover {
   Transform<World, Object> start;
   double reach = 0.0;  ///< largest |coordinate| in its own frame
   double radius = 0.0;  ///< of the ball around it whose middle is that of its box
-  double hides = 0.0;   ///< share of the lines through that ball that meet it
+  Hiding hides{};
   RTCScene embree = nullptr;
   std::shared_ptr<const CoherentTree> tree = nullptr;  ///< of meshes that are worth one
 };

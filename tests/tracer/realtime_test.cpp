@@ -81,7 +81,7 @@ TEST(Realtime, FollowsABallThatMoves) {
 TEST(Realtime, MendsWhatItExpectsOfMovers) {
   const Scene scene = sceneOf(roomWith("shape = 'box'\nsize_m = [2.2, 1.6, 0.02]\neuler_deg = [0, 90, 0]\n"
                                        "position_m = [0.2, 0.1, 3.2]\nvelocity_m_per_s = [1e-6, 0, 0]"));
-  ASSERT_NEAR(scene.impl().poses.at(0).hides, 0.32, 0.05);
+  ASSERT_NEAR(scene.impl().poses.at(0).hides.all, 0.32, 0.05);
   const TraceRequest request = roomRequest();
   Frames run;
   for (int frame = 0; frame < 80; ++frame) run.next(scene.at(frame * 33.333333_ms), request);
