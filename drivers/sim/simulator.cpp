@@ -11,6 +11,7 @@
 #include "drivers/logging.h"
 #include "drivers/loss_reasons.h"
 #include "drivers/sim/chosen.h"
+#include "drivers/sim/long_slices.h"
 #include "drivers/sim/operating.h"
 #include "drivers/sim/view.h"
 #include "protocol/settings/describe.h"
@@ -90,6 +91,7 @@ class SimulatedSource final : public Source {
   [[nodiscard]] const SourceInfo& info() const override { return info_; }
 
   Result<> start() override {
+    takeLongSlices();
     pacer_.restart();
     made_ = 0;
     last_collected_.reset();
