@@ -50,7 +50,7 @@ std::string whatCounts(const std::vector<Finding>& findings) {
   std::string worse;
   for (const Finding& finding : findings) {
     for (const Outcome& o : finding.outcomes) {
-      if (!(o.fitted_mm > o.as_is_mm)) continue;
+      if (!(o.fitted_mm > o.as_is_mm) || shown(o.fitted_mm) == shown(o.as_is_mm)) continue;
       worse += fmt::format("{}{} ({} for {})", worse.empty() ? "" : ", ", o.data, shown(o.fitted_mm), shown(o.as_is_mm));
     }
   }

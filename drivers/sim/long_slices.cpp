@@ -13,8 +13,8 @@ namespace {
 
 constexpr std::uint64_t kSlice_ns = 20'000'000;  // usual are 0.7 to 3 ms
 
-/// Of sched_setattr(2), for which the C library has no function yet; <linux/sched/types.h> defines a structure again that
-/// <sched.h> has.
+/// Of sched_setattr(2), for which the C library has no function before 2.41; <linux/sched/types.h> defines a structure again
+/// that <sched.h> has.
 struct SchedulingAttributes {
   std::uint32_t size, policy;
   std::uint64_t flags;
@@ -32,10 +32,13 @@ void takeLongSlice() {
   ::syscall(SYS_sched_setattr, 0, &attributes, 0);
 }
 
-/// Of threads that join others' work, once each.
+/// Of threads that join this one's work, once each.
 class Workers : public tbb::task_scheduler_observer {
  public:
   Workers() { observe(true); }
+  ~Workers() override { observe(false); }
+  Workers(const Workers&) = delete;
+  Workers& operator=(const Workers&) = delete;
   void on_scheduler_entry(bool is_worker) override {
     thread_local bool is_done = false;
     if (!is_worker || is_done) return;
@@ -47,9 +50,8 @@ class Workers : public tbb::task_scheduler_observer {
 }  // namespace
 
 void takeLongSlices() {
-  // Never destroyed: workers may outlive what main() leaves behind.
-  static const auto* const workers = new Workers;
-  static_cast<void>(workers);
+  // The library watches who joins the work of the thread that asks for it.
+  thread_local const Workers workers;
   takeLongSlice();
 }
 

@@ -18,6 +18,7 @@
 #include "sim/images/rows.h"
 #include "sim/sensor/collect_moving.h"
 #include "sim/sensor/frame_assembly.h"
+#include "sim/sensor/lens_off_axis.h"
 #include "sim/sensor/sensor_model.h"
 #include "sim/tracer/missing_light.h"
 
@@ -399,6 +400,8 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   chosen->keys.applyTo(request);
   if (const auto missing = sim::missingLight(chosen->scene, request.emitters, chosen->keys.mode == Mode::RealTime))
     logging::warn("{}: {}", table.place("scene"), *missing);
+  if (const auto off_axis = sim::lensOffAxis(chosen->model.camera()))
+    logging::warn("{}: {}", table.place(table.has("camera") ? "camera" : "uri"), *off_axis);
   auto interferences = chosen->model.interferences(chosen->scene.foreignEmitters());
   View view{std::move(chosen->scene), std::move(request), std::move(interferences), motionOf(chosen->keys),
             chosen->model.rowDelay()};

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <stdexcept>
 #include <stop_token>
 #include <vector>
 
@@ -30,7 +31,9 @@ class View {
         camera_(std::move(camera)),
         row_delay_(row_delay),
         request_(std::move(request)),
-        interferences_(std::move(interferences)) {}
+        interferences_(std::move(interferences)) {
+    if (interferences_.size() != foreign_.size()) throw std::invalid_argument{"a view needs an interference per foreign emitter"};
+  }
 
   [[nodiscard]] const sim::Scene& scene() const { return scene_; }
   /// At time 0.

@@ -50,7 +50,7 @@ std::string_view find(const Names& names, Value value) {
 
 /// Words of other cameras and of their programs.
 constexpr std::pair<std::string_view, std::string_view> kOtherWords[]{
-    {"confidence", "flags, and exposure where a frame takes several"},
+    {"confidence", "flags, and where a frame takes several exposures, exposure"},
     {"infrared", "amplitude"},
     {"ir", "amplitude"},
     {"intensity", "amplitude"},
@@ -77,7 +77,7 @@ std::optional<PlaneKind> planeKindNamed(std::string_view name) {
 
 std::string otherWordFor(std::string_view plane) {
   for (const auto& [word, ours] : kOtherWords) {
-    if (plane == word) return "; what others call \"" + std::string{word} + "\" is " + std::string{ours} + " here";
+    if (plane == word) return "; for what others call \"" + std::string{word} + "\" see " + std::string{ours};
   }
   return {};
 }

@@ -175,30 +175,12 @@ Duration CameraFile::exposureTime() const {
   return time;
 }
 
-namespace {
-
-/// Sizes and centres are changed apart, and a size alone leaves a lens that looks elsewhere.
-void checkCentre(settings::Table& table, const char* where, const CameraFile::Lens& lens) {
-  const auto check = [&](const char* key, double centre, const char* side, int size) {
-    if (centre >= -0.5 && centre <= size - 0.5) return;
-    table.complain(where, fmt::format("has {} = {:.6g}, which lies outside of its {} of {} pixels: with another size scale "
-                                      "fx, fy, cx and cy as well",
-                                      key, centre, side, size));
-  };
-  check("cx", lens.cx, "width", lens.width);
-  check("cy", lens.cy, "height", lens.height);
-}
-
-}  // namespace
-
 CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effects) {
   CameraFile file;
   table.read(file);
   for (settings::Table& effect : table.tables("effect")) readEffect(effect, effects);
   if (file.emitters.empty()) table.complain("", "has no [[emitter]]: a camera needs at least one");
   checkKind(table, file);
-  checkCentre(table, "lens", file.lens);
-  for (const auto& color : file.colors) checkCentre(table, "color", color.lens);
   for (const auto& emitter : file.emitters) {
     if (std::hypot(emitter.axis[0], emitter.axis[1], emitter.axis[2]) < 1e-6) {
       table.complain("emitter", "has an axis of length 0, which points nowhere");

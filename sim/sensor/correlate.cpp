@@ -89,6 +89,14 @@ std::vector<Harmonic> correlatedTerms(const std::vector<Response>& responses, in
   return seen;
 }
 
+std::vector<Harmonic> correlatedTerms(const std::vector<Response>& responses, const Light& light) {
+  std::vector<Harmonic> seen = correlatedTerms(responses, light.harmonics);
+  for (std::size_t term = 0; term < std::min(seen.size(), light.error.content.size()); ++term) {
+    if (light.error.content[term] != std::complex<float>{}) seen[term] = Harmonic::Seen;
+  }
+  return seen;
+}
+
 std::vector<SeenHarmonic> foldedTerms(const std::vector<Response>& responses, int harmonics, int steps) {
   const std::vector<Harmonic> terms = correlatedTerms(responses, harmonics);
   std::vector<SeenHarmonic> seen(terms.begin(), terms.end());
@@ -115,10 +123,9 @@ Light correlatedPart(const Light& light, const std::vector<Response>& responses,
     part.phasors = light.phasors;
   } else {
     part.phasors.resize(light.phasors.size());
-    const std::vector<Harmonic> seen = correlatedTerms(responses, light.harmonics);
+    const std::vector<Harmonic> seen = correlatedTerms(responses, light);
     for (std::size_t term = 0; term < seen.size(); ++term) {
-      const bool is_added = term < light.error.content.size() && light.error.content[term] != std::complex<float>{};
-      if (seen[term] != Harmonic::Unseen || is_added) part.phasors[term] = light.phasors[term];
+      if (seen[term] != Harmonic::Unseen) part.phasors[term] = light.phasors[term];
     }
   }
   part.steady = light.steady;

@@ -33,6 +33,8 @@ std::vector<std::complex<double>> relativeHarmonics(const Waveform& emitted,
 
 /// How correlate() sees the light's phasors, in their order, by what the responses hold of them.
 std::vector<Harmonic> correlatedTerms(const std::vector<Response>& responses, int harmonics);
+/// The same, with those seen that the light's own modulation error adds.
+std::vector<Harmonic> correlatedTerms(const std::vector<Response>& responses, const Light& light);
 /// The same, with the faint ones folded that so many steps see as they see the first: n = ±1 modulo the steps, where
 /// exp(i n θₖ) = exp(±i θₖ). Right as long as nothing turns harmonics or shifts steps between the light and its
 /// correlation.

@@ -1,17 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/sensor/exposures.h"
 
-#include <cmath>
+#include <cstdint>
+
+#include <toftwin/frame.h>
 
 #include "sim/images/rows.h"
 
 namespace toftwin::sim {
 namespace {
 
-/// Whether a pixel of `a` is to be taken rather than that of `b`.
-bool isBetter(const RangeImage& a, const RangeImage& b, std::size_t pixel) {
-  const bool a_valid = !std::isnan(a.range_m[pixel]), b_valid = !std::isnan(b.range_m[pixel]);
-  return a_valid != b_valid ? a_valid : a.amplitude[pixel] > b.amplitude[pixel];
+/// Whether a shorter exposure is needed. One that was too dark, or contradicted itself, would be so all the more: of close
+/// frequencies it would pass for another turn of the phase.
+bool isSaturated(const RangeImage& image, std::size_t pixel) {
+  return (image.flags[pixel] & static_cast<std::uint8_t>(PixelFlag::Saturated)) != 0;
 }
 
 void take(const RangeImage& from, std::size_t pixel, RangeImage& to) {
@@ -59,7 +61,7 @@ RangeImage mergeExposures(std::span<const RangeImage> parts) {
     const auto last = static_cast<std::size_t>(last_row) * static_cast<std::size_t>(width);
     for (std::size_t e = 1; e < parts.size(); ++e) {
       for (std::size_t i = first; i < last; ++i) {
-        if (!isBetter(parts[e], merged, i)) continue;
+        if (!isSaturated(merged, i)) continue;
         take(parts[e], i, merged);
         merged.exposure[i] = static_cast<std::uint8_t>(e);
       }

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <stdexcept>
 #include <utility>
 
 #include "sim/sensor/collect_moving.h"
@@ -30,6 +31,9 @@ Interference::Interference(ForeignEmitterSpec emitter, const std::vector<Own>& o
   for (std::size_t i = 0; i < own.size(); ++i) {
     const double fundamental = std::abs(own[i].emitted.coefficient(1, own[i].frequency) *
                                         own[i].demodulating.coefficient(1, own[i].frequency));
+    const auto is_positive = [](double value) { return std::isfinite(value) && value > 0.0; };
+    if (!is_positive(emitter_.frequency.in(hertz)) || !is_positive(own[i].frequency.in(hertz)) || !is_positive(fundamental))
+      throw std::invalid_argument{"interference needs frequencies above 0 and waveforms with a fundamental"};
     for (int n = 1; n <= harmonics; ++n) addBeatsOf(i, own[i], n, fundamental);
   }
 }
@@ -105,10 +109,12 @@ void Interference::addTo(Light& light, const Light& other, const Exposure& expos
   const auto isSeen = [&](std::size_t own) { return light.frequencies[own] == exposure.modulation; };
   for (const Lacking& one : lacking_) {
     if (!isSeen(one.own)) continue;
-    light.phasor(one.own, one.harmonic) = {light.width(), light.height()};
     light.error.content.resize(light.phasors.size());
-    light.error.content[one.own * static_cast<std::size_t>(light.harmonics) + static_cast<std::size_t>(one.harmonic - 1)] =
-        std::complex<float>{one.content};
+    std::complex<float>& content =
+        light.error.content[one.own * static_cast<std::size_t>(light.harmonics) + static_cast<std::size_t>(one.harmonic - 1)];
+    if (content != std::complex<float>{}) continue;  // another one was added before
+    content = std::complex<float>{one.content};
+    light.phasor(one.own, one.harmonic) = {light.width(), light.height()};
   }
   for (const Beat& beat : beats_) {
     if (isSeen(beat.own)) addBeat(beat, other, exposure, row_delay, light);

@@ -19,13 +19,14 @@ namespace toftwin::sim {
 /// as ambient light: charge and shot noise. Of its modulation, a raw exposure from t − T/2 to t + T/2 (device time)
 /// keeps where overtones of both meet: with the other light's waveform e′ at frequency f′ and its phase φ at time 0,
 /// the pixel's reference r at f, and the response of correlate() to the camera's own e,
-///     ± g/2 · m Re Σₙ Σₘ (q e′ₘ rₙ* / |e₁ r₁|) P′ₘ exp(i (n θₖ + m φ + 2π Δ t)) sinc(π Δ T),   Δ = m f′ − n f
-/// with P′ₘ its phasor over the way to the pixel at m f′, q how much of the waveform's modulation it has, and
-/// sinc x = sin x / x. Of m, the two count whose m f′ lie next to n f: all others beat faster than f′/2, of which an
-/// exposure keeps less than 2 / (π f′ T). So many harmonics n count as the camera's own (`sampling.harmonics`).
+///     ± g/2 · C Re Σₙ Σₘ (q e′ₘ rₙ* / |e₁ r₁|) P′ₘ exp(i (n θₖ + m φ + 2π Δ t)) sinc(π Δ T),   Δ = m f′ − n f
+/// with the pixel's contrast C, P′ₘ the other light's phasor over the way to the pixel at m f′, q how much of the waveform's
+/// modulation it has, and sinc x = sin x / x. Of m, the two count whose m f′ lie next to n f: all others beat at f′ or faster,
+/// of which an exposure keeps less than 1 / (π f′ T). So many harmonics n count as the camera's own (`sampling.harmonics`).
 /// Closed form of the integral over the exposure of both Fourier series; the sum over n is that of correlate().
 ///
-/// Deviations: own light's delays (warm-up, clock, effects on emission) turn this light as well, by a constant phase.
+/// Deviations: effects on the camera's own emission (delays, duty_drift, rise_drift) act on both lights together, where the
+/// own waveform nearly lacks a harmonic by much. Clocks are exact: clock_scale changes ranges, not beats.
 /// Of a camera with the effect `harmonics`, which adds to what overtones are worth, n = 1 alone counts. Where many
 /// pulses fall into an exposure, a pulsed camera sees the mean alone.
 class Interference {

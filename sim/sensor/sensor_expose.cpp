@@ -288,7 +288,7 @@ void SensorModel::countLight(const Light& light, const Conditions& now, std::uin
   };
   const auto acting = actingOnLight(impl_->effects, light, now);
   if (const LensScatter* scatter = onlyScatter(acting)) {
-    const ScatteredRows scattered{*scatter, light, sim::correlatedTerms(responses, light.harmonics)};
+    const ScatteredRows scattered{*scatter, light, sim::correlatedTerms(responses, light)};
     count([&] { return ScatteredFill{scattered, responses, steps, taps}; });
     return;
   }

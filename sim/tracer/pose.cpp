@@ -70,7 +70,7 @@ double radiusOf(const BuiltObject& own, const RTCBounds& box) {
 }
 
 Hiding hidesOf(RTCScene mover, const RTCBounds& box, double radius) {
-  constexpr std::uint32_t kLines = 4096, kEnough = 256;
+  constexpr std::uint32_t kLines = 4096, kEnough = 1024;
   const auto d = [](float v) { return static_cast<double>(v); };
   const Vec3d middle = middleOf(box);
   const PixelKey key = pixelKey(seedKey(0), 0, 0);

@@ -13,8 +13,8 @@ void addPlanes(BuiltObject& object);
 double reachOf(const BuiltObject& own);
 /// Radius of a ball around it, whose middle is that of its box in its own frame.
 double radiusOf(const BuiltObject& own, const RTCBounds& box);
-/// Of lines drawn through that ball; not of glass. Something that lets less than a thousandth of the lines near its middle
-/// through may pass for one that lets none.
+/// Of 4096 lines drawn through that ball; not of glass. Its core is where none of at least 1024 of them came through: in
+/// truth fewer than three in a thousand do (95 %), all of them near its edge unless the thing has small holes.
 Hiding hidesOf(RTCScene mover, const RTCBounds& box, double radius);
 
 }  // namespace toftwin::sim

@@ -188,6 +188,13 @@ void readForeignEmitters(Table& root, SceneSpec& scene) {
     table.read(emitter);
     checkDirection(table, "axis", emitter.axis);
     if (emitter.power_w == 0.0) table.complain("power_w", "= 0 gives no light; remove this emitter");
+    using Wave = ForeignEmitterSpec::Wave;
+    const auto needs = [&](const char* key, bool is_met, const char* what) {
+      if (table.has(key) && !is_met) table.complain(key, fmt::format("has no meaning without emitted = {}", what));
+    };
+    needs("emitted_duty", emitter.emitted == Wave::Square, "\"square\"");
+    needs("emitted_clip", emitter.emitted == Wave::ClippedSine, "\"clipped_sine\"");
+    needs("rise_ns", emitter.emitted != Wave::LikeCamera, "a waveform of its own");
   }
 }
 

@@ -51,7 +51,7 @@ struct BuiltObject {
 /// What a moving object is in the way of, of the lines through the ball around it.
 struct Hiding {
   double all = 0.0;   ///< share that meet it
-  double core = 0.0;  ///< radius of a ball around the same middle: all lines through that one do, m
+  double core = 0.0;  ///< radius of a ball around the same middle through which no line was found that does not, m
   double rim = 0.0;   ///< share of those beside the core that meet it
 };
 

@@ -79,7 +79,7 @@ TEST(Names, EveryPlaneKindComesBackFromItsName) {
     EXPECT_EQ(planeKindNamed(nameOf(kind)), kind);
   }
   EXPECT_EQ(planeKindNamed("distance"), std::nullopt);
-  EXPECT_EQ(otherWordFor("distance"), "; what others call \"distance\" is range here");
+  EXPECT_EQ(otherWordFor("distance"), "; for what others call \"distance\" see range");
   EXPECT_EQ(otherWordFor("range"), "");
 }
 

@@ -47,6 +47,22 @@ TEST(Exposures, EachPixelIsOfTheLongestThatDoesNotSaturate) {
   EXPECT_NEAR(image.amplitude(150, 10), 3e4, 1.0);  // a tenth of 60 times as much
 }
 
+/// What the longest exposure finds too dark is no better in a shorter one, whose noise may pass for a signal.
+TEST(Exposures, AreNotTakenForWhatIsTooDark) {
+  const SensorModel model = threeExposures("[decoder]\nminimum_amplitude_electrons = 1000\n" + kWell + kShotNoise +
+                                           "[[effect]]\ntype = 'read_noise'\nsigma_electrons = 1000\n");
+  const TraceRequest request = model.traceRequest();
+  const Light dark = syntheticLight(model.camera().width, model.camera().height, request.frequencies, 1,
+                                    [](int, int) { return std::vector<Way>{{0.02, 1.1}}; });
+  const RangeImage image = model.expose(dark, {}, 1, 0).range;
+  std::size_t invalid = 0;
+  for (std::size_t i = 0; i < image.range_m.size(); ++i) {
+    ASSERT_EQ(image.exposure[i], 0);
+    invalid += std::isnan(image.range_m[i]) ? 1 : 0;
+  }
+  EXPECT_GT(invalid, image.range_m.size() / 4) << "too bright to tell";
+}
+
 TEST(Exposures, OneAloneLosesTheBrightPixels) {
   const SensorModel model = modelOf(plainCamera(4, 2, 0.5, kWell));
   const RangeImage image = model.expose(brightAndDark(model), {}, 1, 0).range;

@@ -19,10 +19,11 @@ constexpr double kWay_m = 7.3;       // from the other emitter to the pinhole
 constexpr double kRadiance = 0.05;   // mean
 constexpr double kGain = 1e6;        // electrons per radiance in one exposure
 
-/// Mean 1, centred on t = 0.
-double signal(const std::string& shape, double duty, double turns) {
+/// Mean 1, centred on t = 0. `rise_turns`: the sine is behind a low pass of that time constant, in turns.
+double signal(const std::string& shape, double duty, double turns, double rise_turns = 0.0) {
   turns -= std::round(turns);
-  if (shape == "sine") return 1.0 + std::cos(2.0 * kPi * turns);
+  if (shape == "sine")
+    return 1.0 + std::cos(2.0 * kPi * turns - std::atan(2.0 * kPi * rise_turns)) / std::hypot(1.0, 2.0 * kPi * rise_turns);
   return std::abs(turns) < 0.5 * duty ? 1.0 / duty : 0.0;
 }
 
@@ -34,6 +35,7 @@ struct Case {
   std::string other;  ///< the other light's waveform, as its key says
   double other_duty = 0.5;
   double tolerance;  ///< of the largest difference of taps
+  double other_rise_ns = 0.0;  ///< of a sine
 };
 
 SensorModel cameraOf(const Case& of) {
@@ -60,6 +62,10 @@ gap_us = 3
 harmonics = {}
 [pixel]
 electrons_per_radiance_s = {}
+# It changes nothing, but before effects on the light act, harmonics go that nobody wants.
+[[effect]]
+type = "vignetting"
+exponent = 0
 )", of.own_mhz, of.emitted, of.demodulated, of.harmonics, kGain / 2e-3), "camera.toml");
   if (!model) throw std::runtime_error{model.error().message};
   return *std::move(model);
@@ -68,8 +74,10 @@ electrons_per_radiance_s = {}
 ForeignEmitterSpec emitterOf(const Case& of) {
   const auto scene = sceneOf(fmt::format("[[material]]\nname = 'm'\n[[object]]\nshape = 'sphere'\nradius_m = 1\nmaterial = 'm'\n"
                                          "[[foreign_emitter]]\nfrequency_mhz = {}\nphase_deg = 25\nmodulation = 0.9\n"
-                                         "emitted = '{}'\nemitted_duty = {}\n",
-                                         of.other_mhz, of.other, of.other_duty));
+                                         "emitted = '{}'\n",
+                                         of.other_mhz, of.other) +
+                             (of.other == "square" ? fmt::format("emitted_duty = {}\n", of.other_duty) : "") +
+                             (of.other_rise_ns > 0.0 ? fmt::format("rise_ns = {}\n", of.other_rise_ns) : ""));
   return scene.foreignEmitters().front();
 }
 
@@ -84,7 +92,8 @@ double integral(const Case& of, const Exposure& exposure, int step) {
   for (int i = 0; i < kIntervals; ++i) {
     const double place = std::fmod(0.6180339887498949 * i, 1.0);
     const double t = start + duration * (i + place) / kIntervals;
-    const double light = 0.9 * signal(shape, of.other_duty, other * (t - kWay_m / kSpeedOfLight_m_per_s) + 25.0 / 360.0) + 0.1;
+    const double turns = other * (t - kWay_m / kSpeedOfLight_m_per_s) + 25.0 / 360.0;
+    const double light = 0.9 * signal(shape, of.other_duty, turns, 1e-9 * of.other_rise_ns * other) + 0.1;
     sum += light * (signal(of.demodulated, 0.5, own * t - step / 4.0) - 1.0);
   }
   const auto fundamental = [](const std::string& wave) { return wave == "sine" ? 0.5 : 2.0 / kPi; };
@@ -133,6 +142,7 @@ TEST(Interference, IsTheIntegralOfBothSignals) {
            Case{"a sine on the third of a reference, which the own light lacks", 20.0, 60.00009, "sine", "square", 3,
                 "sine", 0.5, 2e-4},
            Case{"two of a kind, of square waves", 20.0, 20.0001, "square", "square", 15, "like_camera", 0.5, 2e-3},
+           Case{"a slow sine", 80.0, 80.00013, "sine", "sine", 1, "sine", 0.5, 1e-5, 3.0},
            Case{"too far apart to be seen", 20.0, 27.0, "sine", "sine", 1, "sine", 0.5, 1.0},
        }) {
     const SensorModel model = cameraOf(of);
@@ -149,6 +159,33 @@ TEST(Interference, IsTheIntegralOfBothSignals) {
     for (std::size_t k = 0; k < exposures.size(); ++k)
       EXPECT_NEAR(added[k], exact[k], of.tolerance * most + 0.02) << of.what << ", step " << k;
   }
+}
+
+/// Two of them add up, also where the camera's own light has no such harmonic.
+TEST(Interference, OfTwoOthersIsTheirSum) {
+  const Case of{"both", 20.0, 60.00009, "sine", "square", 3, "sine", 0.5, 0.0};
+  const SensorModel model = cameraOf(of);
+  const Interference interference = model.interferences({emitterOf(of)}).front();
+  const TraceRequest request = interference.request(model.traceRequest());
+  const Exposure exposure = model.exposures(DeviceTime{123'456'000}).front();
+  Light other;
+  other.frequencies = request.frequencies;
+  other.steady = {2, 1, 0.05f};
+  other.phasors.assign(request.frequencies.size(), {2, 1, {0.03f, 0.01f}});
+  const auto mixed = [&](int times) {
+    Light light;
+    light.frequencies = {20_MHz};
+    light.harmonics = 3;
+    light.phasors.assign(3, {2, 1});
+    light.steady = light.ambient = {2, 1};
+    for (int i = 0; i < times; ++i) interference.addTo(light, other, exposure, 0_us);
+    return light;
+  };
+  const Light once = mixed(1), twice = mixed(2);
+  EXPECT_GT(std::abs(once.phasor(0, 3)(0, 0)), 1e-3f);
+  EXPECT_LT(std::abs(twice.phasor(0, 3)(0, 0) - 2.0f * once.phasor(0, 3)(0, 0)), 1e-8f);
+  EXPECT_EQ(twice.error.content, once.error.content);
+  EXPECT_THROW(Interference(emitterOf(of), {{.frequency = 0_MHz}}, 1), std::invalid_argument);
 }
 
 /// Its own way and direction, whatever the camera's pose; no light is traced for beats that leave nothing.

@@ -144,6 +144,18 @@ material = "mirror"
   EXPECT_EQ(log->count("toftwind.toml:2: the scene has a curved mirror or thin glass"), 1);
 }
 
+TEST_F(Simulator, WarnsOfALensWhoseAxisLiesOutsideOfItsImage) {
+  const auto log = std::make_shared<toftwin::test::KeptLog>();  // shared with spdlog
+  const toftwin::test::LoggingTo logging{log};
+  std::string narrow = kCamera;
+  narrow.replace(narrow.find("width = 24"), 10, "width = 10");
+  std::ofstream{folder_ / "narrow.toml"} << narrow;
+  open();
+  EXPECT_EQ(log->count("lens's axis"), 0);
+  ASSERT_TRUE(tryOpen("camera = 'narrow.toml'\n"));
+  EXPECT_EQ(log->count("toftwind.toml:1: the lens's axis (cx 11.5, cy 9.5) lies outside of the image of 10 × 20 pixels"), 1);
+}
+
 TEST_F(Simulator, SameSeedSameBytes) {
   const auto one = open("seed = 5\n"), two = open("seed = 5\n"), other = open("seed = 6\n");
   for (int i = 0; i < 3; ++i) {

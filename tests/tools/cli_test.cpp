@@ -64,7 +64,7 @@ TEST(Toftwin, AWrongCommandLineIsStatus2AndSaysWhatIsWrong) {
            {"grab kinect -o a.png --region 0,0,0,0", "0 × 0 pixels are none"},
            {"grab kinect -o a.png -p range,flags", "takes one plane"},
            {"replay a.mcap -o a.ply -p range,flags", "takes one plane"},
-           {"grab kinect -o a.png -p ir", "what others call \"ir\" is amplitude here"},
+           {"grab kinect -o a.png -p ir", "for what others call \"ir\" see amplitude"},
            {"record kinect o3d kinect -o a.mcap", "kinect is named twice"},
            {"list -a localhost:99999", "99999"},
            {"info kinect --text", "--text goes with preset:NAME"},
@@ -143,6 +143,7 @@ TEST(Toftwin, APresetsNameAloneIsToldHowItIsWritten) {
   EXPECT_EQ(ran.status, 3);
   EXPECT_THAT(ran.err, HasSubstr("toftwin info preset:o3d303"));
   EXPECT_EQ(toftwin("info preset:o3d303").status, 0);
+  EXPECT_THAT(toftwin("render preset:o3d304 -o /tmp/never.png").err, HasSubstr("no camera preset \"o3d304\""));
 }
 
 TEST(Toftwin, WhatIsNotThereIsStatus4) {

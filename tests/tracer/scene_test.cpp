@@ -75,6 +75,8 @@ TEST(SceneFile, RefusesWhatCannotBeSeen) {
   EXPECT_THAT(errorOf(box + "[[object]]\nname = 'twin'\nmaterial = 'm'\nshape = 'box'\n"),
               HasSubstr("this object is in the same place as that of scene.toml:3"));
   EXPECT_EQ(errorOf(box + "[[object]]\nmaterial = 'm'\nshape = 'box'\nposition_m = [1, 0, 0]\n"), "no error");
+  EXPECT_THAT(errorOf(box + "[[foreign_emitter]]\nemitted = 'sine'\nemitted_duty = 0.2\n"),
+              HasSubstr("scene.toml:8: emitted_duty has no meaning without emitted = \"square\""));
   EXPECT_THAT(errorOf(box + "[[foreign_emitter]]\npower_w = 0\n"), HasSubstr("scene.toml:7: power_w = 0 gives no light"));
   EXPECT_THAT(errorOf(box + "period_s = 1\n[[object.keyframe]]\n[[object.keyframe]]\ntime_s = 2\n"),
               HasSubstr("time_s = 2 is beyond period_s = 1"));

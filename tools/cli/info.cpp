@@ -201,8 +201,8 @@ Result<Exit> run(const Options& options) {
   const std::vector<std::string> presets = sim::SensorModel::presetNames();
   if (described || std::ranges::find(presets, options.what) == presets.end()) return described;
   Error error = described.error();
-  error.message += fmt::format(". The simulator's camera of this name is {}{}: toftwin info {}{}", kPreset, options.what,
-                               kPreset, options.what);
+  error.message = fmt::format("the simulator's camera {} is described by: toftwin info {}{}. As a source's name: {}",
+                              options.what, kPreset, options.what, error.message);
   return error;
 }
 

@@ -12,6 +12,7 @@
 #include "sim/images/content_hash.h"
 #include "sim/sensor/color.h"
 #include "sim/sensor/frame_assembly.h"
+#include "sim/sensor/lens_off_axis.h"
 #include "sim/tracer/missing_light.h"
 #include "sim/tracer/scene.h"
 
@@ -22,8 +23,9 @@ constexpr std::string_view kDefaultScene = drivers::simulator::kDefaultScene;
 constexpr const char* kDefaultSceneName = "default scene";
 
 Result<sim::SensorModel> loadCamera(const std::string& camera) {
-  return std::filesystem::path{camera}.extension() == ".toml" ? sim::SensorModel::load(camera)
-                                                              : sim::SensorModel::preset(camera);
+  constexpr std::string_view kPreset = "preset:";  // as `toftwin info` names them
+  if (std::filesystem::path{camera}.extension() == ".toml") return sim::SensorModel::load(camera);
+  return sim::SensorModel::preset(camera.starts_with(kPreset) ? camera.substr(kPreset.size()) : camera);
 }
 
 Result<sim::Scene> loadScene(const std::string& scene) {
@@ -163,6 +165,8 @@ Result<Job> jobOf(const RenderOptions& options) {
   if (!scene) return scene.error();
   if (const auto missing = sim::missingLight(*scene, model->traceRequest().emitters, false))
     fmt::print(stderr, "toftwin: {}: warning: {}\n", options.scene, *missing);
+  if (const auto off_axis = sim::lensOffAxis(model->camera()))
+    fmt::print(stderr, "toftwin: {}: warning: {}\n", options.camera, *off_axis);
   const auto pose = options.pose.pose();
   if (!pose) return pose.error();
   auto trajectory =

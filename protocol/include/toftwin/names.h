@@ -17,7 +17,7 @@ std::string_view nameOf(PixelFlag flag);
 /// The value of a word, or nothing.
 std::optional<PlaneKind> planeKindNamed(std::string_view name);
 
-/// For who asks for a plane by another camera's word: "" or `; what others call "ir" is amplitude here`.
+/// For who asks for a plane by another camera's word: "" or `; for what others call "ir" see amplitude`.
 std::string otherWordFor(std::string_view plane);
 
 }  // namespace toftwin
