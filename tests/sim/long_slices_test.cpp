@@ -37,11 +37,14 @@ TEST(LongSlices, AreOfThisThreadAndItsWorkersAlone) {
     const std::uint64_t longer = slice_ns();
     EXPECT_GT(longer, usual);
     const auto self = std::this_thread::get_id();
-    sim::inParallel(64, 1, [&](int, int) {
-      others += std::this_thread::get_id() == self ? 0 : 1;
-      wrong += slice_ns() == longer ? 0 : 1;
-      ::usleep(1000);
-    });
+    others = 0;
+    for (int i = 0; i < 200 && others == 0; ++i) {  // on a busy computer workers come late
+      sim::inParallel(64, 1, [&](int, int) {
+        others += std::this_thread::get_id() == self ? 0 : 1;
+        wrong += slice_ns() == longer ? 0 : 1;
+        ::usleep(1000);
+      });
+    }
   };
   std::jthread{compute}.join();
   std::jthread{compute}.join();

@@ -39,6 +39,8 @@ TEST_F(O3d303Images, TheTypeOfTheImagerSetsTheCamerasFrequenciesAndExposures) {
   };
   setType("upto30m_moderate");
   auto native = client();
+  // The nearest surfaces fill so small a well.
+  ASSERT_TRUE(native.setParameter("cam", "saturation.full_well_electrons", 18000.0).ok());
   auto frames = native.subscribe("cam", {});
   ASSERT_TRUE(frames.ok()) << frames.error().message;
   const auto frame = frames->next(kSoon);
