@@ -1,0 +1,165 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "sim/terms/image_terms.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include <toftwin/nan.h>
+
+#include "sim/images/simd.h"
+
+namespace toftwin::terms {
+namespace {
+
+/// Columns together with rows make places; a frame's number together with anything else is the image's own.
+Varies together(Varies a, Varies b) {
+  if (a == b) return a;
+  if (a == Varies::Frame || b == Varies::Frame || a == Varies::Pixel || b == Varies::Pixel) return Varies::Pixel;
+  return Varies::Place;
+}
+
+Varies variesOf(const Argument& argument, const ImageTerms::FieldOf& fieldOf) {
+  std::optional<Varies> varies;
+  for (const auto& part : argument.parts) {
+    const Varies of_part = fieldOf(part.covariate).varies;
+    varies = varies ? together(*varies, of_part) : of_part;
+  }
+  return varies.value_or(Varies::Frame);
+}
+
+TOFTWIN_SIMD void addKnown(const double* product, double* sums, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) sums[i] += product[i] == product[i] ? product[i] : 0.0;
+}
+
+void multiplyBy(const std::vector<double>& factors, std::span<double> product) {
+  for (std::size_t i = 0; i < product.size(); ++i) product[i] *= factors[i];
+}
+
+}  // namespace
+
+double ImageTerms::Layer::at(std::size_t x, std::size_t y, std::size_t width) const {
+  if (varies == Varies::Column) return values[x];
+  return varies == Varies::Row ? values[y] : values[y * width + x];
+}
+
+ImageTerms::ImageTerms(const std::vector<Term>& terms, int width, int height, const FieldOf& fieldOf)
+    : width_(static_cast<std::size_t>(width)), height_(static_cast<std::size_t>(height)) {
+  for (const Term& term : terms) {
+    Compiled& compiled = terms_.emplace_back(Compiled{.coefficient = term.coefficient});
+    for (const Factor& factor : term.factors) compile(factor, fieldOf, compiled);
+  }
+  setFrame([](std::string_view) { return Known{kNaN, {}}; });
+}
+
+void ImageTerms::compile(const Factor& factor, const FieldOf& fieldOf, Compiled& into) {
+  const Varies varies = variesOf(factor.of, fieldOf);
+  if (varies == Varies::Frame) return into.of_frame.push_back(factor);
+  if (varies == Varies::Pixel) return into.of_pixels.push_back(pixelFactor(factor, fieldOf));
+  Layer values = layerOf(factor.of, varies, fieldOf);
+  for (double& value : values.values) value = valueOf(factor, value);
+  std::optional<Layer>& product =
+      varies == Varies::Column ? into.column : (varies == Varies::Row ? into.row : into.place);
+  if (product) multiplyBy(values.values, product->values);
+  else product = std::move(values);
+}
+
+/// The argument's value wherever it differs.
+ImageTerms::Layer ImageTerms::layerOf(const Argument& argument, Varies varies, const FieldOf& fieldOf) const {
+  const std::size_t columns = varies == Varies::Row ? 1 : width_, rows = varies == Varies::Column ? 1 : height_;
+  Layer sum{varies, std::vector<double>(columns * rows, 0.0)};
+  for (const auto& [weight, covariate] : argument.parts) {
+    const Field field = fieldOf(covariate);
+    const bool is_row = field.varies == Varies::Row, is_column = field.varies == Varies::Column;
+    for (std::size_t y = 0; y < rows; ++y) {
+      for (std::size_t x = 0; x < columns; ++x)
+        sum.values[y * columns + x] +=
+            weight * field.at(is_row ? 0 : static_cast<int>(x), is_column ? 0 : static_cast<int>(y));
+    }
+  }
+  return sum;
+}
+
+ImageTerms::PixelFactor ImageTerms::pixelFactor(const Factor& factor, const FieldOf& fieldOf) {
+  PixelFactor compiled{.basis = BasisOfMany{factor}};
+  for (const Argument::Part& part : factor.of.parts) {
+    const Varies varies = fieldOf(part.covariate).varies;
+    if (varies == Varies::Frame) compiled.of_frame.parts.push_back(part);
+    else if (varies == Varies::Pixel) compiled.parts.push_back({part.weight, numberOf(part.covariate)});
+    else compiled.still.push_back(layerOf({{part}}, varies, fieldOf));
+  }
+  return compiled;
+}
+
+std::size_t ImageTerms::numberOf(const std::string& covariate) {
+  const auto known = std::ranges::find(per_pixel_, covariate);
+  if (known != per_pixel_.end()) return static_cast<std::size_t>(known - per_pixel_.begin());
+  per_pixel_.push_back(covariate);
+  return per_pixel_.size() - 1;
+}
+
+void ImageTerms::setFrame(const Lookup& lookup) {
+  for (Compiled& term : terms_) {
+    term.frame_value = term.coefficient;
+    for (const Factor& factor : term.of_frame) term.frame_value *= valueOf(factor, lookup);
+    for (PixelFactor& factor : term.of_pixels) {
+      factor.frame_value = 0.0;
+      for (const auto& [weight, covariate] : factor.of_frame.parts)
+        factor.frame_value += weight * lookup(covariate).number;
+    }
+  }
+}
+
+/// The covariates of a row's pixels, each written once when it is first needed, and room for an argument.
+class ImageTerms::RowValues {
+ public:
+  RowValues(const PixelRow& pixels, std::size_t width, std::size_t count)
+      : pixels_(pixels), rows_(count), argument_(width) {}
+
+  std::span<const double> argumentOf(const PixelFactor& factor, std::size_t y) {
+    const bool is_plain = factor.parts.size() == 1 && factor.parts[0].weight == 1.0 && factor.still.empty() &&
+                          factor.of_frame.parts.empty();
+    if (is_plain) return rowOf(factor.parts[0].which);
+    std::ranges::fill(argument_, factor.frame_value);
+    for (const auto& [weight, which] : factor.parts) {
+      const std::vector<double>& row = rowOf(which);
+      for (std::size_t x = 0; x < argument_.size(); ++x) argument_[x] += weight * row[x];
+    }
+    for (const Layer& layer : factor.still)
+      for (std::size_t x = 0; x < argument_.size(); ++x) argument_[x] += layer.at(x, y, argument_.size());
+    return argument_;
+  }
+
+ private:
+  const std::vector<double>& rowOf(std::size_t which) {
+    if (rows_[which].empty()) {
+      rows_[which].resize(argument_.size());
+      pixels_(which, rows_[which]);
+    }
+    return rows_[which];
+  }
+
+  const PixelRow& pixels_;
+  std::vector<std::vector<double>> rows_;
+  std::vector<double> argument_;
+};
+
+void ImageTerms::addTerm(const Compiled& term, std::size_t y, RowValues& values, std::span<double> product,
+                         std::span<double> sums) const {
+  const double same = term.frame_value * (term.row ? term.row->values[y] : 1.0);
+  if (same == 0.0 || std::isnan(same)) return;
+  std::ranges::fill(product, same);
+  if (term.column) multiplyBy(term.column->values, product);
+  if (term.place)
+    for (std::size_t x = 0; x < width_; ++x) product[x] *= term.place->values[y * width_ + x];
+  for (const PixelFactor& factor : term.of_pixels) factor.basis.multiply(values.argumentOf(factor, y), product);
+  addKnown(product.data(), sums.data(), width_);
+}
+
+void ImageTerms::addRow(int y, const PixelRow& pixels, std::span<double> sums) const {
+  RowValues values{pixels, width_, per_pixel_.size()};
+  std::vector<double> product(width_);
+  for (const Compiled& term : terms_) addTerm(term, static_cast<std::size_t>(y), values, product, sums);
+}
+
+}  // namespace toftwin::terms
