@@ -14,7 +14,9 @@
 
 #include "daemon/facades/event_thread.h"
 #include "daemon/facades/listen_for.h"
+#include "daemon/facades/modbus/excuses.h"
 #include "daemon/facades/modbus/frame_facts.h"
+#include "daemon/facades/modbus/identification.h"
 #include "daemon/facades/modbus/keys.h"
 #include "daemon/facades/modbus/server.h"
 #include "daemon/facades/source_link.h"
@@ -103,11 +105,13 @@ class ModbusFacade final : public Facade {
  private:
   Bytes answerTo(std::span<const std::byte> message) {
     refresh();
-    return answer(message, registers_, [this](const Write& write) { return take(write); });
+    return answer(
+        message, registers_, [this](const Write& write) { return take(write); }, identity_);
   }
 
   void takeFrame(const Frame& frame) {
     facts_ = watch_.factsOf(frame);
+    excuses_.takeFrame(link_.health().dropped_by_device, under_way_ > 0);
     if (triggered_at_) registers_.set(Item::Trigger, 0.0);
     triggered_at_.reset();
   }
@@ -186,10 +190,11 @@ class ModbusFacade final : public Facade {
 
   void acknowledge() {
     has_failed_ = false;
-    lost_acknowledged_ = link_.health().dropped_by_device;
+    lost_acknowledged_ = excuses_.countOf(link_.health().dropped_by_device);
   }
 
   void setRecipe(std::uint16_t number) {
+    excuses_.begin(link_.health().dropped_by_device);
     link_.post(
         [recipe = recipes_[number - 1U]](drivers::Source& source) -> Result<> {
           for (const Setting& one : recipe) {
@@ -218,6 +223,7 @@ class ModbusFacade final : public Facade {
             });
   }
   void setPose(const Transform<World, Camera>& pose, std::function<void(bool)> then) {
+    excuses_.begin(link_.health().dropped_by_device);
     link_.post([pose](drivers::Source& source) { return source.setPose(pose); }, ending(std::move(then)));
   }
 
@@ -271,7 +277,7 @@ class ModbusFacade final : public Facade {
     registers_.set(Item::AlarmStale, is_stale);
     registers_.set(Item::AlarmTemperature, hottest_c > keys_.most_temperature.in(celsius));
     registers_.set(Item::AlarmCommand, has_failed_);
-    registers_.set(Item::AlarmDrops, lost > lost_acknowledged_);
+    registers_.set(Item::AlarmDrops, excuses_.countOf(lost) > lost_acknowledged_);
     registers_.set(Item::AlarmFewValid, facts_ && facts.valid < keys_.least_valid);
     unsigned alarms = 0, status = 0;
     for (std::size_t bit = 0; bit < 8; ++bit) {
@@ -300,6 +306,7 @@ class ModbusFacade final : public Facade {
   const Keys keys_;
   const std::vector<Recipe> recipes_;
   const FacadePlace place_;
+  const Identity identity_{.application = place_.keys.source};
   std::string where_;
   EventThread thread_;
   SourceLink link_;
@@ -309,7 +316,8 @@ class ModbusFacade final : public Facade {
   std::size_t connections_ = 0;
   int under_way_ = 0;
   bool has_failed_ = false;
-  std::uint64_t lost_acknowledged_ = 0;
+  std::uint64_t lost_acknowledged_ = 0;  ///< of those that are not excused
+  Excuses excuses_;
   FrameWatch watch_;
   std::optional<FrameFacts> facts_;
   std::optional<steady_clock::time_point> triggered_at_, wanted_since_;

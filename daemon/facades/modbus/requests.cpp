@@ -3,6 +3,8 @@
 
 #include <algorithm>
 
+#include "daemon/facades/modbus/identification.h"
+
 namespace toftwin::daemon::modbus {
 namespace {
 
@@ -88,8 +90,26 @@ Reply writeMany(const Registers& registers, const TakeWrite& take, Memory memory
   return taken(registers, take, write, data.first(4));
 }
 
-Reply reply(const Registers& registers, const TakeWrite& take, std::uint8_t function,
-            std::span<const std::byte> data) {
+/// Function 23: what to read, what to write, and the words, which are written first.
+Reply writeAndRead(const Registers& registers, const TakeWrite& take, std::span<const std::byte> data) {
+  constexpr std::size_t kWhatToRead = 4, kMostWords = 121;
+  if (data.size() < kWhatToRead + 5) return refuse(Exception::kValue);
+  const auto to_read = data.first(kWhatToRead), to_write = data.subspan(kWhatToRead);
+  if (wordAt(to_write, 2) > kMostWords) return refuse(Exception::kValue);
+  // What cannot be read must not have been written.
+  if (Reply unread = read(registers, Memory::Holding, to_read); unread.exception != 0) return unread;
+  if (Reply written = writeMany(registers, take, Memory::Holding, to_write); written.exception != 0)
+    return written;
+  return read(registers, Memory::Holding, to_read);
+}
+
+Reply identify(std::span<const std::byte> data, const Identity& identity) {
+  auto [bytes, exception] = identificationFor(data, identity);
+  return {std::move(bytes), exception};
+}
+
+Reply reply(const Registers& registers, const TakeWrite& take, const Identity& identity,
+            std::uint8_t function, std::span<const std::byte> data) {
   switch (function) {
     case 1:
       return read(registers, Memory::Coil, data);
@@ -107,6 +127,10 @@ Reply reply(const Registers& registers, const TakeWrite& take, std::uint8_t func
       return writeMany(registers, take, Memory::Coil, data);
     case 16:
       return writeMany(registers, take, Memory::Holding, data);
+    case 23:
+      return writeAndRead(registers, take, data);
+    case 43:
+      return identify(data, identity);
     default:
       return refuse(Exception::kFunction);
   }
@@ -121,9 +145,10 @@ std::optional<std::size_t> messageSize(std::span<const std::byte> bytes) {
   return kUnit + length;
 }
 
-Bytes answer(std::span<const std::byte> message, const Registers& registers, const TakeWrite& take) {
+Bytes answer(std::span<const std::byte> message, const Registers& registers, const TakeWrite& take,
+             const Identity& identity) {
   const std::uint8_t function = byteAt(message, kFunction);
-  const Reply made = reply(registers, take, function, message.subspan(kData));
+  const Reply made = reply(registers, take, identity, function, message.subspan(kData));
   Bytes bytes(message.begin(), message.begin() + kLength);  // transaction and protocol
   const std::size_t data = made.exception != 0 ? 1 : made.data.size();
   append(bytes, static_cast<std::uint16_t>(2 + data));

@@ -14,6 +14,7 @@
 namespace toftwin::daemon::modbus {
 
 using Bytes = std::vector<std::byte>;
+struct Identity;  // identification.h
 
 struct Exception {
   static constexpr std::uint8_t kFunction = 1, kAddress = 2, kValue = 3, kFailure = 4, kBusy = 6;
@@ -32,6 +33,7 @@ using TakeWrite = std::function<std::uint8_t(const Write&)>;
 /// none.
 std::optional<std::size_t> messageSize(std::span<const std::byte> bytes);
 /// The answer to a whole message of that size. Any bytes are safe.
-Bytes answer(std::span<const std::byte> message, const Registers& registers, const TakeWrite& take);
+Bytes answer(std::span<const std::byte> message, const Registers& registers, const TakeWrite& take,
+             const Identity& identity);
 
 }  // namespace toftwin::daemon::modbus

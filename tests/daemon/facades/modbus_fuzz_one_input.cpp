@@ -2,6 +2,7 @@
 // A stream of Modbus TCP messages, cut as the server cuts it.
 #include <cstdlib>
 
+#include "daemon/facades/modbus/identification.h"
 #include "daemon/facades/modbus/requests.h"
 #include "fuzz_one_input.h"
 
@@ -29,7 +30,7 @@ void fuzzOneInput(std::span<const std::byte> bytes) {
   while (true) {
     const auto size = messageSize(bytes);
     if (!size || *size == 0 || bytes.size() < *size) return;
-    const Bytes made = answer(bytes.first(*size), registers, take);
+    const Bytes made = answer(bytes.first(*size), registers, take, Identity{});
     const auto answered =
         messageSize(made);  // an answer is a message, too, and goes into one of the largest size
     demand(answered && *answered == made.size() && made.size() <= 260);
