@@ -61,17 +61,17 @@ struct Images {
   }
 };
 
-std::vector<float> unitVectors() {
-  std::vector<float> rays;
+std::vector<float> rays() {
+  std::vector<float> all;
   for (std::uint32_t v = 0; v < EmulatedO3d303::kHeight; ++v) {
     for (std::uint32_t u = 0; u < EmulatedO3d303::kWidth; ++u) {
       const double x = (u - (EmulatedO3d303::kWidth - 1) / 2.0) / EmulatedO3d303::kFocalLength_px;
       const double y = (v - (EmulatedO3d303::kHeight - 1) / 2.0) / EmulatedO3d303::kFocalLength_px;
       const double norm = std::sqrt(x * x + y * y + 1.0);
-      for (const double e : {x, y, 1.0}) rays.push_back(static_cast<float>(e / norm));
+      for (const double e : {x, y, 1.0}) all.push_back(static_cast<float>(e / norm));
     }
   }
-  return rays;
+  return all;
 }
 
 }  // namespace
@@ -276,7 +276,8 @@ class EmulatedO3d303::Impl {
     frame.distance_mm = images_.distance_mm;
     frame.amplitude = frame.raw_amplitude = images_.amplitude;
     frame.confidence = images_.confidence;
-    frame.unit_vectors = rays_;
+    frame.unit_vectors = unit_vectors_;
+    frame.extrinsics = options_.extrinsics;
     frame.exposures_us = {static_cast<std::uint32_t>(device_.imager("ExposureTime")), 0, 0};
     frame.illumination_c = kIllumination_c;
     const bool is_bad = corrupt > 0 && corrupt-- > 0;
@@ -342,7 +343,7 @@ class EmulatedO3d303::Impl {
   std::list<ConnectionPtr> connections_;
   std::list<std::shared_ptr<tcp::socket>> calls_;
   Images images_;
-  std::vector<float> rays_ = unitVectors();
+  std::vector<float> unit_vectors_ = o3d303::unitVectorsFrom(rays(), options_.extrinsics);
   std::mt19937_64 random_{kSeed};
   Clock::time_point since_;
   std::uint64_t index_ = 0;

@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "drivers/o3d303/wire/extrinsics.h"
 #include "frame_schedule.h"
 #include "o3d303_device.h"
 
@@ -19,6 +20,7 @@ class EmulatedO3d303 {
   struct Options {
     FrameSchedule schedule{std::chrono::milliseconds{50}};
     double clock_skew = 0.0;  ///< device seconds gained per host second
+    o3d303::ExtrinsicCalibration extrinsics{};
   };
   EmulatedO3d303() : EmulatedO3d303(Options{}) {}
   explicit EmulatedO3d303(Options options);

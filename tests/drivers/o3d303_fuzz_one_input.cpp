@@ -6,6 +6,7 @@
 
 #include "drivers/o3d303/frame_images.h"
 #include "drivers/o3d303/wire/frame_content.h"
+#include "drivers/o3d303/wire/frame_writer.h"
 #include "drivers/o3d303/wire/pcic.h"
 #include "drivers/o3d303/wire/schema.h"
 #include "drivers/o3d303/wire/xmlrpc.h"
@@ -68,6 +69,10 @@ void readMessages(std::span<const std::byte> bytes) {
 void readTexts(std::string_view text) {
   if (const auto schema = readSchema(text)) {
     for (const SchemaElement& element : *schema) demand(element.id.size() <= text.size());
+    CameraFrame none;
+    none.width = none.height = 0;
+    const auto content = writeFrameContent(*schema, none);
+    demand(!content || content->size() <= 512 * (schema->size() + 1) + text.size());
   }
   if (const auto call = readXmlRpcCall(text)) {
     const auto again = readXmlRpcCall(encodeXmlRpc(*call));

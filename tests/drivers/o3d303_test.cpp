@@ -105,6 +105,19 @@ TEST(O3d303, TheLensIsFoundFromTheUnitVectors) {
   EXPECT_EQ(lens.calibration_id.size(), 32u);
 }
 
+/// Range and depth are the lens' own, wherever a client says that the camera stands.
+TEST(O3d303, SoItIsOfACameraWhoseExtrinsicsTurnThem) {
+  auto options = fast();
+  options.extrinsics = {100.0F, -50.0F, 20.0F, 25.0F, -40.0F, 130.0F};
+  EmulatedO3d303 camera{options};
+  const auto opened = openWith(camera);
+  ASSERT_TRUE(opened.ok()) << opened.error().message;
+  const CameraInfo& lens = (*opened)->info().camera;
+  EXPECT_NEAR(lens.fx, EmulatedO3d303::kFocalLength_px, 1e-4);
+  EXPECT_NEAR(lens.cx, (EmulatedO3d303::kWidth - 1) / 2.0, 1e-4);
+  EXPECT_NEAR(lens.cy, (EmulatedO3d303::kHeight - 1) / 2.0, 1e-4);
+}
+
 void expectCompliant(const EmulatedO3d303& camera, const std::string& keys) {
   const Driver driver = row();
   const Candidate candidate{.driver = &driver,

@@ -8,7 +8,7 @@
 namespace toftwin::daemon::o3d303 {
 
 /// What the camera leaves out of its images: pixels beside a rectangle, and points beside a cuboid in the
-/// camera's coordinates (X forward, Y left, Z up, moved by the extrinsic calibration).
+/// coordinates of its X, Y and Z images (X right, Y down, Z forward, as the extrinsic calibration puts them).
 struct Clipping {
   int left = 0, top = 0, right = 1 << 16, bottom = 1 << 16;  ///< the last ones that stay
   std::array<double, 3> least_m{-1e30, -1e30, -1e30}, most_m{1e30, 1e30, 1e30};

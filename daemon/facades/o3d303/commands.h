@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
 #include <string_view>
 
 #include "drivers/o3d303/wire/schema.h"
@@ -13,24 +14,41 @@ struct Output {
   static constexpr unsigned kAll = kResults | kErrors | kNotifications;
 };
 
-/// A PCIC command as the camera understands it.
+/// A PCIC command as the camera understands it. [ifm, operating instructions O3D303, process interface]
 struct Command {
   enum class Kind {
-    SetSchema,  ///< "c", nine digits, JSON
-    AskSchema,  ///< "C?"
-    SetOutput,  ///< "p" and a hexadecimal digit
-    Trigger,    ///< "t"
-    AskError,   ///< "E?"
-    Refused,    ///< one of these with what cannot be
-    Other       ///< for the device, or not known
+    SetSchema,        ///< "c", nine digits, JSON
+    AskSchema,        ///< "C?"
+    SetOutput,        ///< "p" and a hexadecimal digit
+    Trigger,          ///< "t"
+    TriggerAndWait,   ///< "T?"
+    AskError,         ///< "E?"
+    AskImage,         ///< "I", two digits, "?"
+    AskConnection,    ///< "L?"
+    AskCommands,      ///< "H?"
+    Activate,         ///< "a", two digits: an application
+    SetVersion,       ///< "v", two digits
+    SetWire,          ///< "o", two digits, 0 or 1: an output of the camera
+    AskWire,          ///< "O", two digits, "?"
+    Refused,          ///< one of these with what cannot be
+    Other             ///< for the device, or not known, or of another length
   };
   Kind kind = Kind::Other;
   toftwin::o3d303::Schema schema{};
+  std::string schema_text{};  ///< as it came
   unsigned output = 0;
+  int number = 0;  ///< of an image, an application, a version or a wire
+  bool is_high = false;
 };
 /// Whether every frame can be written after that schema.
 bool isServed(const toftwin::o3d303::Schema& schema);
+/// What the command "I" asks for by that number, up to 9 and 11; empty: nothing has it.
+toftwin::o3d303::Schema schemaOfImage(int number);
+/// The same without "star" and "stop": what is sent because it was asked for has neither.
+toftwin::o3d303::Schema withoutMarkers(toftwin::o3d303::Schema schema);
 /// Any bytes are safe.
 Command readCommand(std::string_view content);
+/// What the command "H?" answers.
+std::string_view listOfCommands();
 
 }  // namespace toftwin::daemon::o3d303

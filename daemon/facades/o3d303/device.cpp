@@ -65,7 +65,7 @@ Device::Outcome Device::answer(std::string_view path, const XmlRpcCall& call, St
 }
 
 Device::Outcome Device::onMain(const XmlRpcCall& call, SteadyTime now) {
-  if (call.method == "getParameter" || call.method == "getAllParameters") return {look(device_, call)};
+  if (call.method == "getParameter" || call.method == "getAllParameters") return {look(shownDevice(), call)};
   if (call.method == "requestSession") return requestSession(call, now);
   if (call.method == "getSWVersion") return {structOf(versions())};
   if (call.method == "getHWInfo") {
@@ -176,9 +176,7 @@ Device::Outcome Device::setMode(const XmlRpcCall& call) {
 }
 
 /// What it set for itself is undone, what it did not save is forgotten.
-Device::Outcome Device::cancelSession() {
-  return {.answer = nothing(), .changes = restart()};
-}
+Device::Outcome Device::cancelSession() { return {.answer = nothing(), .changes = restart()}; }
 
 SourceChanges Device::restart() {
   SourceChanges undone = session_ ? std::move(session_->before) : SourceChanges{};
@@ -201,6 +199,7 @@ Device::Outcome Device::setTemporarily(const XmlRpcCall& call) {
   if (wanted == nullptr) return {fault(Fault::kWrongType, "a struct of parameters is wanted")};
   if (is_editing_) return {fault(Fault::kApplicationInEdit, "nothing is set for a while in edit mode")};
   SourceChanges changes, before;
+  Application wished = live_;
   for (const auto& [path, value] : *wanted) {
     constexpr std::string_view kImager = "imager_001/";
     if (!path.starts_with(kImager)) return {noSuchParameter(path)};
@@ -220,6 +219,15 @@ Device::Outcome Device::setTemporarily(const XmlRpcCall& call) {
     const double clamped = std::clamp(static_cast<double>(*number), least, most);
     changes.emplace_back(bound->binding->source_name, bound->toSource(clamped));
     before.emplace_back(bound->binding->source_name, *bound->parameter->value);
+    wished.imager[name] = fmt::format("{:.0f}", clamped);
+  }
+  // Exposures that take longer than the frames are apart slow the camera down.
+  fitExposures(wished);
+  const auto rate = boundOf(Binding::Object::Imager, "FrameRate");
+  const auto slower = frameRateFor(wished);
+  if (rate && rate->parameter->value && slower && *slower < *rate->parameter->value) {
+    changes.emplace_back(rate->binding->source_name, *slower);
+    before.emplace_back(rate->binding->source_name, *rate->parameter->value);
   }
   for (auto& one : before) {  // what was first is what is put back
     const auto is_same = [&](const auto& other) { return other.first == one.first; };
@@ -236,12 +244,16 @@ std::vector<int> Device::applications() const {
   return all;
 }
 
-std::array<float, 3> Device::translation_mm() const {
-  std::array<float, 3> t{};
-  const char* names[] = {"ExtrinsicCalibTransX", "ExtrinsicCalibTransY", "ExtrinsicCalibTransZ"};
-  for (std::size_t i = 0; i < t.size(); ++i)
-    t[i] = static_cast<float>(realIn(device_.at(names[i])).value_or(0.0));
-  return t;
+toftwin::o3d303::ExtrinsicCalibration Device::extrinsics() const {
+  toftwin::o3d303::ExtrinsicCalibration extrinsics{};
+  std::size_t i = 0;
+  for (const char* kind : {"Trans", "Rot"}) {
+    for (const char axis : {'X', 'Y', 'Z'}) {
+      const auto number = realIn(device_.at(fmt::format("ExtrinsicCalib{}{}", kind, axis)));
+      extrinsics[i++] = static_cast<float>(number.value_or(0.0));
+    }
+  }
+  return extrinsics;
 }
 
 }  // namespace toftwin::daemon::o3d303

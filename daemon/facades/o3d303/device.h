@@ -14,9 +14,12 @@
 #include <toftwin/result.h>
 
 #include "daemon/clock.h"
+#include "daemon/facades/o3d303/auto_exposure.h"
 #include "daemon/facades/o3d303/bindings.h"
+#include "daemon/facades/o3d303/binning.h"
 #include "daemon/facades/o3d303/clipping.h"
 #include "daemon/facades/o3d303/rules.h"
+#include "drivers/o3d303/wire/extrinsics.h"
 #include "drivers/o3d303/wire/schema.h"
 #include "drivers/o3d303/wire/xmlrpc.h"
 
@@ -57,8 +60,9 @@ struct SourceFacts {
   int frequencies = 1;
   std::optional<double> illumination_c, housing_c, processor_c;
   double since_power_on_s = 0.0;
-  std::int64_t device_s = 0;           ///< the clock of the frames
-  std::optional<std::int64_t> host_s;  ///< this machine's, where the relation of the two is known
+  std::int64_t device_s = 0;  ///< the clock of the frames
+  /// This machine's clock, where its relation to that of the frames is known.
+  std::optional<std::int64_t> host_ns;
 };
 
 /// What a client's wish makes of the source: its parameters' names and values.
@@ -95,25 +99,45 @@ class Device {
   /// While a client edits, and while no application is active, the camera takes no frames.
   [[nodiscard]] bool isIdle() const { return is_editing_ || !applications_.contains(activeApplication()); }
   [[nodiscard]] bool isEditing() const { return is_editing_; }
-  /// What connections get that have asked for nothing yet.
+  /// What connections get that have asked for nothing yet, and as a client wrote it.
   [[nodiscard]] const toftwin::o3d303::Schema& defaultSchema() const { return default_schema_; }
-  [[nodiscard]] std::array<float, 3> translation_mm() const;
+  [[nodiscard]] std::string defaultSchemaText() const;
+  /// What a client has set; the optics themselves stand where the camera does.
+  [[nodiscard]] toftwin::o3d303::ExtrinsicCalibration extrinsics() const;
   /// Of the active application.
   [[nodiscard]] const Clipping& clipping() const { return clipping_; }
-  /// By how much a client has set the camera's clock, against the source's.
+  /// By how much a client has set the camera's clock against this machine's, which it follows from then on. 0
+  /// while it is to be that of the network, which here is this machine's. Nothing: neither was done.
+  [[nodiscard]] std::optional<std::int64_t> hostShift_ns() const;
+  /// By how much a client has set it against the source's, where its relation to this machine's is not known.
   [[nodiscard]] std::int64_t clockShift_s() const { return clock_shift_s_; }
-  /// Whether the clock is to be that of the network, which here is this machine's.
-  [[nodiscard]] bool isSynchronised() const { return time_.at("SynchronizationActivated") == "true"; }
+  /// Whether the active application has half the source's rows and columns.
+  [[nodiscard]] std::optional<Binning> binning() const;
+  /// How the active application chooses the exposure by itself; nothing: it does not.
+  struct ExposureControl {
+    ExposureRegion region{};
+    AutoExposure::Bounds bounds{};
+  };
+  [[nodiscard]] std::optional<ExposureControl> exposureControl() const;
+  /// Makes an application active by the process interface. Nothing: there is none, or not now.
+  std::optional<Outcome> select(int index);
   /// 0: none.
   [[nodiscard]] int activeApplication() const;
   [[nodiscard]] std::vector<int> applications() const;
   [[nodiscard]] const Parameters& parameters() const { return device_; }
+  [[nodiscard]] const Parameters& network() const { return network_; }
+  /// Whether a frame comes when a client of the process interface asks for one; else it runs freely, or waits
+  /// for an edge of its wire.
+  [[nodiscard]] bool isTriggeredByCommand() const;
 
  private:
   static constexpr int kMostApplications = 32;
+  /// From so many columns on the source is what the camera calls resolution 1.
+  static constexpr int kFineWidth = 352;
   struct Application {
     Parameters application, imager, spatial, temporal;
     int width = 176, height = 132;  ///< that the clipping is of
+    bool has_resolution = false;    ///< a client has chosen it
     /// What the source had when the parameter was shown with that text, which may be rounded.
     struct Shown {
       std::string text;
@@ -148,6 +172,7 @@ class Device {
   // device_edit.cpp: edit mode, and the device's own parameters
   Outcome onEdit(const Call& call);
   Outcome addApplication(const Call& call);
+  Outcome nameApplication(const Call& call);
   Outcome deleteApplication(int index);
   Outcome factoryReset();
   Outcome onDeviceParameters(const Call& call);
@@ -161,6 +186,7 @@ class Device {
   Outcome activate(int index);
   int createApplication(Application made);
   [[nodiscard]] Application freshApplication() const;
+  [[nodiscard]] Parameters shownDevice() const;
   [[nodiscard]] Parameters shownNetwork() const;
   [[nodiscard]] Parameters shownTime() const;
   [[nodiscard]] std::int64_t clockNow_s() const;
@@ -175,6 +201,8 @@ class Device {
   [[nodiscard]] Refusal setImagerParameter(Application& of, const std::string& name, std::string value) const;
   [[nodiscard]] Refusal setFilterParameter(Application& of, Binding::Object object, const std::string& name,
                                            std::string value) const;
+  [[nodiscard]] Refusal setSpecial(Application& of, const std::string& name, std::string value) const;
+  [[nodiscard]] Refusal setResolution(Application& of, const std::string& value) const;
   [[nodiscard]] Refusal setBound(Parameters& all, Binding::Object object, const Rule& rule,
                                  std::string value) const;
   [[nodiscard]] Refusal setType(Application& of, std::string_view text) const;
@@ -193,7 +221,11 @@ class Device {
   [[nodiscard]] std::optional<Bound> boundOf(Binding::Object object, std::string_view name) const;
   [[nodiscard]] SourceChanges changesTo(const Application& wanted) const;
   [[nodiscard]] std::optional<double> numberOf(const Application& application, const Bound& bound) const;
-  void show(Application& application) const;
+  enum class RateShown { AsSource, AsWished };
+  void show(Application& application, RateShown rate_shown = RateShown::AsWished) const;
+  void showSize(Application& application) const;
+  void showFrameRate(Application& application, RateShown rate_shown) const;
+  [[nodiscard]] std::optional<double> frameRateFor(const Application& application) const;
   void refreshActive();
   [[nodiscard]] Clipping clippingOf(const Application& application) const;
 
@@ -216,6 +248,7 @@ class Device {
   bool is_editing_ = false;
   std::string password_, edited_password_;
   std::int64_t clock_shift_s_ = 0;
+  std::optional<std::int64_t> host_shift_ns_;
   toftwin::o3d303::Schema default_schema_;
   Clipping clipping_;
 };

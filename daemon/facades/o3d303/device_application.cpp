@@ -36,8 +36,11 @@ bool hasParameters(const Parameters& imager, Binding::Object object) {
 
 std::optional<XmlRpcAnswer> checkTriggerMode(const std::string& value) {
   if (!numberIn(value)) return fault(Fault::kWrongType, "TriggerMode is a number");
-  if (value == "1" || value == "2") return std::nullopt;
-  return fault(Fault::kOutOfRange, "there is no wire to trigger by: 1 or 2");
+  const int mode = numberIn(value).value_or(0);
+  if (mode >= 1 && mode <= 5) return std::nullopt;
+  return fault(
+      Fault::kOutOfRange,
+      "TriggerMode is 1 free run, 2 by command, or 3 to 5 by edges of the wire: rising, falling, both");
 }
 
 std::optional<XmlRpcAnswer> checkSchema(const std::string& value) {
@@ -149,23 +152,49 @@ Device::Refusal Device::setImagerParameter(Application& one, const std::string& 
     if (!refused) fitExposures(one);
     return refused;
   }
-  if (name == "ContinuousAutoExposure") {
-    return fault(Fault::kNoAutoExposure, "exposures are not chosen by the camera itself");
-  }
+  if (rule.kind == Rule::Kind::Special) return setSpecial(one, name, std::move(value));
+  auto refused = check(rule, value);
+  if (!refused) found->second = std::move(value);
+  return refused;
+}
+
+Device::Refusal Device::setSpecial(Application& one, const std::string& name, std::string value) const {
+  if (name == "Resolution") return setResolution(one, value);
   Refusal refused;
-  if (name == "ClippingCuboid") {
+  if (name == "ContinuousAutoExposure") {
+    const Rule is_switch{name, "false", Rule::Kind::Switch};
+    refused = check(is_switch, value);
+    if (!refused && value == "true" && !boundOf(Binding::Object::Imager, "ExposureTime"))
+      refused = fault(Fault::kNoAutoExposure, "the source behind this camera has no exposure time to choose");
+  } else if (name == "ClippingCuboid") {
     Clipping read;
     if (!readCuboid(value, read))
       refused = fault(Fault::kWrongFormat, "ClippingCuboid is JSON with XMin to ZMax");
-  } else if (rule.kind == Rule::Kind::Special) {
+  } else if (name == "AutoExposureReferenceROI") {
+    if (!readExposureRegion(value))
+      refused = fault(Fault::kWrongFormat, "AutoExposureReferenceROI is JSON with ROIs, each a rectangle");
+  } else {
     const bool is_column = name == "ClippingLeft" || name == "ClippingRight";
     const double last = (is_column ? one.width : one.height) - 1;
     refused = checkNumber(name, value, {0.0, last}, true);
-  } else {
-    refused = check(rule, value);
   }
-  if (!refused) found->second = std::move(value);
+  if (!refused) one.imager.at(name) = std::move(value);
   return refused;
+}
+
+/// 0: half the rows and columns of a source that has those of resolution 1.
+Device::Refusal Device::setResolution(Application& one, const std::string& value) const {
+  if (!numberIn(value)) return fault(Fault::kWrongType, "Resolution is a number");
+  const bool is_possible = value == "0" || (value == "1" && facts_.width >= kFineWidth);
+  if (!is_possible) {
+    return fault(Fault::kOutOfRange,
+                 fmt::format("the source has {} x {} pixels: Resolution is 0{}", facts_.width, facts_.height,
+                             facts_.width >= kFineWidth ? " or 1" : ""));
+  }
+  one.imager.at("Resolution") = value;
+  one.has_resolution = true;
+  showSize(one);
+  return std::nullopt;
 }
 
 /// Where the source has nothing of the kind, the parameter stands as it is.

@@ -20,19 +20,6 @@ using toftwin::o3d303::XmlRpcValue;
 
 namespace {
 
-std::string defaultSchemaText() {
-  using namespace toftwin::o3d303;
-  using Type = SchemaElement::Type;
-  return toJson({{Type::Text, "start_string", "star"},
-                 {Type::Blob, std::string{kAmplitudeBlob}, {}},
-                 {Type::Blob, std::string{kDistanceBlob}, {}},
-                 {Type::Blob, std::string{kXBlob}, {}},
-                 {Type::Blob, std::string{kYBlob}, {}},
-                 {Type::Blob, std::string{kZBlob}, {}},
-                 {Type::Blob, std::string{kConfidenceBlob}, {}},
-                 {Type::Text, "end_string", "stop"}});
-}
-
 bool isAddress(const std::string& text) {
   boost::system::error_code is_none;
   boost::asio::ip::make_address_v4(text, is_none);
@@ -45,7 +32,6 @@ Device::Application Device::freshApplication() const {
   if (factory_) return *factory_;
   Application fresh{initialOf(applicationRules()), initialOf(imagerRules()), initialOf(spatialFilterRules()),
                     initialOf(temporalFilterRules())};
-  fresh.application["PcicTcpResultSchema"] = defaultSchemaText();
   fitExposures(fresh);
   return fresh;
 }
@@ -64,10 +50,11 @@ Device::Outcome Device::onEdit(const XmlRpcCall& call) {
   if (call.method == "stopEditingApplication") return edited_.reset(), Outcome{nothing()};
   if (call.method == "factoryReset") return factoryReset();
   if (call.method == "createApplication") {
-    if (paramText(call, 0) != "Camera")
+    if (!call.params.empty() && paramText(call, 0) != "Camera")
       return {fault(Fault::kWrongApplicationType, "the only type is Camera")};
     return addApplication(call);
   }
+  if (call.method == "changeNameAndDescription") return nameApplication(call);
   const bool has_index = call.method == "editApplication" || call.method == "copyApplication" ||
                          call.method == "deleteApplication";
   if (!has_index) return {noSuchMethod(call)};
@@ -88,6 +75,24 @@ Device::Outcome Device::addApplication(const XmlRpcCall& call) {
   const int made = createApplication(is_copy ? applications_.at(numberIn(paramText(call, 0)).value_or(0))
                                              : freshApplication());
   return {XmlRpcValue{made}};
+}
+
+/// At once, as the camera does it beside what is edited.
+Device::Outcome Device::nameApplication(const XmlRpcCall& call) {
+  const auto index = numberIn(paramText(call, 0));
+  const auto found = index ? applications_.find(*index) : applications_.end();
+  if (found == applications_.end()) return {fault(Fault::kNoSuchApplication, "there is no such application")};
+  Application named = found->second;
+  for (const auto& [name, value] :
+       {std::pair{"Name", paramText(call, 1)}, {"Description", paramText(call, 2)}}) {
+    if (auto refused = setApplicationParameter(named, name, value)) return {*std::move(refused)};
+  }
+  found->second = std::move(named);
+  if (edited_ && edited_->first == *index) {
+    for (const char* name : {"Name", "Description"})
+      edited_->second.application[name] = found->second.application[name];
+  }
+  return {nothing()};
 }
 
 /// Without an active one the camera takes no frames until another is made active.
@@ -121,6 +126,7 @@ Device::Outcome Device::factoryReset() {
   edited_network_ = network_;
   time_ = edited_time_ = initialOf(timeRules());
   clock_shift_s_ = 0;
+  host_shift_ns_.reset();
   applications_.clear();
   const Application fresh = freshApplication();
   createApplication(fresh);
@@ -130,8 +136,16 @@ Device::Outcome Device::factoryReset() {
 
 // ---- the device ----------------------------------------------------------------------------------
 
+/// In edit mode what is set is seen before it is saved, by the main object, too.
+Parameters Device::shownDevice() const {
+  if (!is_editing_) return device_;
+  Parameters all = edited_device_;
+  for (const char* of_now : kOfNow) all[of_now] = device_.at(of_now);
+  return all;
+}
+
 Device::Outcome Device::onDeviceParameters(const XmlRpcCall& call) {
-  if (call.method == "getParameter" || call.method == "getAllParameters") return {look(edited_device_, call)};
+  if (call.method == "getParameter" || call.method == "getAllParameters") return {look(shownDevice(), call)};
   if (call.method == "setParameter") {
     auto refused = setDeviceParameter(paramText(call, 0), paramText(call, 1));
     return {refused ? *std::move(refused) : nothing()};
@@ -181,6 +195,13 @@ Device::Outcome Device::activate(int index) {
   device_["ActiveApplication"] = edited_device_["ActiveApplication"] = std::to_string(index);
   refreshActive();
   return outcome;
+}
+
+/// The parameter IOExternApplicationSwitch leaves the choice to the camera's wires.
+std::optional<Device::Outcome> Device::select(int index) {
+  const bool is_left_to_wires = device_.at("IOExternApplicationSwitch") != "0";
+  if (is_editing_ || is_left_to_wires || !applications_.contains(index)) return std::nullopt;
+  return index == activeApplication() ? Outcome{nothing()} : activate(index);
 }
 
 // ---- network and time ----------------------------------------------------------------------------
@@ -253,6 +274,9 @@ Device::Outcome Device::setClock(const XmlRpcCall& call) {
     return {fault(Fault::kWrongType, "setCurrentTime wants a whole number of seconds since 1970")};
   if (*seconds < 0) return {fault(Fault::kOutOfRange, "the time is not before 1970")};
   clock_shift_s_ = *seconds - facts_.device_s;
+  host_shift_ns_.reset();
+  constexpr std::int64_t kPerSecond = 1'000'000'000;  // nanoseconds
+  if (facts_.host_ns) host_shift_ns_ = *seconds * kPerSecond - *facts_.host_ns;
   return {nothing()};
 }
 

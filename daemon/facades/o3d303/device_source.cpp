@@ -17,6 +17,8 @@ namespace toftwin::daemon::o3d303 {
 namespace {
 
 constexpr double kSecondsPerHour = 3600.0;
+constexpr std::string_view kFrameRate = "FrameRate";
+constexpr const char *kFreeRun = "1", *kByProcessInterface = "2";
 
 /// With one digit, cut off, as the camera shows it.
 std::string mostLedRate(const Parameters& imager) {
@@ -42,7 +44,7 @@ void Device::update(const SourceFacts& facts) {
   device_["TemperatureIMX6"] = degrees(facts.processor_c);
   device_["UpTime"] = fmt::format("{:.6f}", facts.since_power_on_s / kSecondsPerHour);
   device_["ImageTimestampReference"] = std::to_string(clockNow_s());
-  show(live_);
+  show(live_, RateShown::AsSource);
   if (!factory_ && !facts.parameters.empty()) {
     factory_ = live_;
     for (auto& [index, one] : applications_) show(one);  // those made before the source was seen
@@ -53,9 +55,16 @@ void Device::update(const SourceFacts& facts) {
   clipping_ = clippingOf(active->second);
 }
 
+std::optional<std::int64_t> Device::hostShift_ns() const {
+  return time_.at("SynchronizationActivated") == "true" ? 0 : host_shift_ns_;
+}
+
 /// As the frames' time stamps have it.
 std::int64_t Device::clockNow_s() const {
-  return isSynchronised() && facts_.host_s ? *facts_.host_s : facts_.device_s + clock_shift_s_;
+  constexpr std::int64_t kNanoseconds = 1'000'000'000;  // in a second
+  const auto shift_ns = hostShift_ns();
+  if (shift_ns && facts_.host_ns) return (*facts_.host_ns + *shift_ns) / kNanoseconds;
+  return facts_.device_s + clock_shift_s_;
 }
 
 const Parameter* Device::parameterOf(std::string_view source_name) const {
@@ -85,7 +94,7 @@ const Parameters& Device::of(const Application& application, Binding::Object obj
   return application.imager;
 }
 
-void Device::show(Application& one) const {
+void Device::show(Application& one, RateShown rate_shown) const {
   Parameters& imager = one.imager;
   ImagerType type{facts_.frequencies, std::max(1, static_cast<int>(facts_.exposures_us.size()))};
   if (const auto* p = parameterOf(kFrequencies); p != nullptr && p->value)
@@ -93,11 +102,10 @@ void Device::show(Application& one) const {
   if (const auto* p = parameterOf(kExposures); p != nullptr && p->value)
     type.exposures = static_cast<int>(*p->value);
   imager["Type"] = type.text();
-  if (facts_.frame_rate_hz) imager["FrameRate"] = fmt::format("{:g}", *facts_.frame_rate_hz);
   if (!facts_.exposures_us.empty()) imager["ExposureTime"] = std::to_string(facts_.exposures_us.back());
   for (const Binding& binding : bindings()) {
     const auto bound = boundOf(binding.object, binding.name);
-    if (!bound || !bound->parameter->value) continue;
+    if (!bound || !bound->parameter->value || binding.name == kFrameRate) continue;
     const std::string text = bound->text(*bound->parameter->value);
     of(one, binding.object)[std::string{binding.name}] = text;
     one.shown[binding.source_name] = {text, *bound->parameter->value};
@@ -106,16 +114,50 @@ void Device::show(Application& one) const {
   if (parameterOf(kExposures) == nullptr && !facts_.exposures_us.empty())
     imager["ExposureTimeList"] = fmt::format("{}", fmt::join(facts_.exposures_us, ";"));
   imager["MaxAllowedLEDFrameRate"] = mostLedRate(imager);
-  one.application["TriggerMode"] = facts_.can_trigger ? "2" : "1";
-  imager["Resolution"] = facts_.width >= 352 ? "1" : "0";
+  showFrameRate(one, rate_shown);
+  std::string& trigger = one.application["TriggerMode"];
+  if (!facts_.can_trigger) trigger = kFreeRun;
+  if (facts_.can_trigger && trigger == kFreeRun) trigger = kByProcessInterface;
+  showSize(one);
+}
+
+void Device::showSize(Application& one) const {
+  Parameters& imager = one.imager;
+  const bool is_fine = facts_.width >= kFineWidth;
+  if (!is_fine) one.has_resolution = false;
+  if (!one.has_resolution) imager["Resolution"] = is_fine ? "1" : "0";
+  const int binning = is_fine && imager["Resolution"] == "0" ? 2 : 1;
+  const int width = facts_.width / binning, height = facts_.height / binning;
   const auto fitClipping = [&](const char* name, int before, int now) {
     const int last = numberIn(imager.at(name)).value_or(before - 1);
     imager[name] = std::to_string(last == before - 1 ? now - 1 : std::min(last, now - 1));
   };
-  fitClipping("ClippingRight", one.width, facts_.width);
-  fitClipping("ClippingBottom", one.height, facts_.height);
-  one.width = facts_.width;
-  one.height = facts_.height;
+  fitClipping("ClippingRight", one.width, width);
+  fitClipping("ClippingBottom", one.height, height);
+  one.width = width;
+  one.height = height;
+}
+
+/// A wish that the exposures do not let the camera keep stays as a client wrote it.
+void Device::showFrameRate(Application& one, RateShown rate_shown) const {
+  const auto bound = boundOf(Binding::Object::Imager, kFrameRate);
+  const auto now_hz = bound && bound->parameter->value ? bound->parameter->value : facts_.frame_rate_hz;
+  if (!now_hz) return;
+  const auto kept_hz = frameRateFor(one);
+  constexpr double kRounding = 1e-6;
+  const bool is_kept = kept_hz && std::abs(*kept_hz - *now_hz) <= kRounding * *now_hz;
+  if (is_kept && rate_shown == RateShown::AsWished) return;
+  const std::string text = fmt::format("{:g}", *now_hz);
+  one.imager[std::string{kFrameRate}] = text;
+  if (bound) one.shown[bound->binding->source_name] = {text, *now_hz};
+}
+
+/// As often as the application wishes, or as its exposures allow.
+std::optional<double> Device::frameRateFor(const Application& one) const {
+  const auto wish_hz = realIn(one.imager.at(std::string{kFrameRate}));
+  const auto most_hz = realIn(one.imager.at("MaxAllowedLEDFrameRate"));
+  if (!wish_hz || !most_hz) return wish_hz;
+  return std::min(*wish_hz, *most_hz);
 }
 
 /// What the real camera lists depends on its type: with three exposures none can be set, with one there is no
@@ -154,7 +196,12 @@ std::optional<double> Device::numberOf(const Application& application, const Bou
   const auto text = all.find(std::string{bound.binding->name});
   if (text == all.end()) return std::nullopt;
   const auto shown = application.shown.find(bound.binding->source_name);
-  if (shown != application.shown.end() && shown->second.text == text->second) return shown->second.number;
+  const bool is_as_shown = shown != application.shown.end() && shown->second.text == text->second;
+  const bool is_slowed =
+      bound.binding->name == kFrameRate &&
+      application.imager.at("MaxAllowedLEDFrameRate") != live_.imager.at("MaxAllowedLEDFrameRate");
+  if (is_as_shown && !is_slowed) return shown->second.number;
+  if (bound.binding->name == kFrameRate) return frameRateFor(application);
   const auto value = text->second == "true" ? 1.0 : text->second == "false" ? 0.0 : realIn(text->second);
   return value ? std::optional{bound.toSource(*value)} : std::nullopt;
 }
@@ -176,9 +223,9 @@ SourceChanges Device::changesTo(const Application& wanted) const {
     const bool is_same = after && before && std::abs(*after - *before) <= kRounding * std::abs(*before);
     if (after && !is_same) changes.emplace_back(binding.source_name, *after);
   }
-  if (parameterOf(kTriggered) != nullptr &&
-      wanted.application.at("TriggerMode") != live_.application.at("TriggerMode")) {
-    changes.emplace_back(kTriggered, wanted.application.at("TriggerMode") == "2" ? 1.0 : 0.0);
+  if (parameterOf(kTriggered) != nullptr && (wanted.application.at("TriggerMode") == kFreeRun) !=
+                                                (live_.application.at("TriggerMode") == kFreeRun)) {
+    changes.emplace_back(kTriggered, wanted.application.at("TriggerMode") == kFreeRun ? 0.0 : 1.0);
   }
   return changes;
 }
@@ -190,6 +237,12 @@ void Device::refreshActive() {
     default_schema_ = *std::move(schema);
   }
   clipping_ = clippingOf(active->second);
+}
+
+std::string Device::defaultSchemaText() const {
+  const auto active = applications_.find(activeApplication());
+  return active == applications_.end() ? toJson(default_schema_)
+                                       : active->second.application.at("PcicTcpResultSchema");
 }
 
 Clipping Device::clippingOf(const Application& application) const {

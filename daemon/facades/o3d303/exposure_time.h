@@ -20,4 +20,10 @@ inline Duration exposuresTake(int frequencies, std::span<const std::uint32_t> ex
   return 2_ms + 8.0 * frequencies * (sum_us * microsecond);
 }
 
+/// The longest exposure with which a frame takes no longer than that: `sum` is that of all exposure times in
+/// units of the longest.
+inline Duration longestExposure(int frequencies, double sum, Duration frame_interval) {
+  return (frame_interval - 2_ms) / (8.0 * frequencies * sum);
+}
+
 }  // namespace toftwin::daemon::o3d303

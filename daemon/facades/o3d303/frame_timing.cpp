@@ -11,7 +11,6 @@
 namespace toftwin::daemon::o3d303 {
 namespace {
 
-constexpr Duration kProcessing = 35.8_ms;
 constexpr std::int64_t kHurried_ns = 40'000'000, kAtLeisure_ns = 50'000'000;  // asked intervals
 
 /// Quantiles of a frame's distance from an even grid (a running median of 21), in ms.

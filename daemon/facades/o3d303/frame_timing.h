@@ -22,6 +22,8 @@ namespace toftwin::daemon::o3d303 {
 /// [1] lovepark/libo3d3xx, modules/oem/doc/data: a thousand intervals of an O3D303 (firmware 1.8.904) each
 class FrameTiming {
  public:
+  /// What processing takes in the mean.
+  static constexpr Duration kProcessing = 35.8_ms;
   /// How the frame is exposed.
   struct Setting {
     int frequencies = 1;

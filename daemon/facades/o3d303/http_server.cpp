@@ -9,6 +9,9 @@
 
 #include <chrono>
 #include <optional>
+#include <string_view>
+
+#include "daemon/facades/o3d303/request_check.h"
 
 namespace toftwin::daemon::o3d303 {
 namespace {
@@ -55,6 +58,15 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
     if (request.method() == http::verb::get || request.method() == http::verb::head)
       return answer(http::status::not_found, "there are no files here: XML-RPC is asked by POST\n");
     if (request.method() != http::verb::post) return answer(http::status::method_not_allowed, "only POST\n");
+    const auto fieldOf = [&](http::field name) {
+      const auto value = request[name];
+      return std::string_view{value.data(), value.size()};
+    };
+    const auto refused = refusalOf({.host = fieldOf(http::field::host),
+                                    .origin = fieldOf(http::field::origin),
+                                    .content_type = fieldOf(http::field::content_type)},
+                                   server_.own_names_);
+    if (refused.status != 0) return answer(http::status{static_cast<unsigned>(refused.status)}, refused.why);
     const auto target = request.target();
     server_.ask_(
         std::string{target.data(), target.size()}, request.body(),
@@ -91,8 +103,9 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   http::response<http::string_body> response_;
 };
 
-HttpServer::HttpServer(tcp::acceptor acceptor, Ask ask)
-    : ask_(std::move(ask)),
+HttpServer::HttpServer(tcp::acceptor acceptor, std::vector<std::string> own_names, Ask ask)
+    : own_names_(std::move(own_names)),
+      ask_(std::move(ask)),
       accepting_(std::move(acceptor), [this](tcp::socket socket) { take(std::move(socket)); }) {}
 
 HttpServer::~HttpServer() {

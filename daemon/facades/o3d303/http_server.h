@@ -9,20 +9,22 @@
 #include <memory>
 #include <set>
 #include <string>
+#include <vector>
 
 #include "daemon/facades/accepting.h"
 
 namespace toftwin::daemon::o3d303 {
 
-/// XML over HTTP: the camera's configuration port. A client that stalls is closed after half a minute and
-/// holds up nobody. Used on the facade's thread only.
+/// XML over HTTP: the camera's configuration port, for programs and not for web pages. A client that stalls
+/// is closed after half a minute and holds up nobody. Used on the facade's thread only.
 class HttpServer {
  public:
   using Answer = std::function<void(std::string xml)>;
   /// Called with a request's path and body; the answer may be given later.
   using Ask = std::function<void(std::string path, std::string body, Answer)>;
 
-  HttpServer(boost::asio::ip::tcp::acceptor acceptor, Ask ask);
+  /// `own_names`: see request_check.h.
+  HttpServer(boost::asio::ip::tcp::acceptor acceptor, std::vector<std::string> own_names, Ask ask);
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;
@@ -35,6 +37,7 @@ class HttpServer {
   class Connection;
   void take(boost::asio::ip::tcp::socket socket);
 
+  const std::vector<std::string> own_names_;
   const Ask ask_;
   bool is_open_ = true;
   std::set<std::shared_ptr<Connection>> connections_;  // shared with their handlers

@@ -34,7 +34,7 @@ Result<std::vector<std::uint16_t>> distancesOf(const Frame& frame, const LensChu
   const auto metres = (range != nullptr ? range : depth)->as<float>();
   std::vector<std::uint16_t> distance_mm(metres.size());
   for (std::size_t i = 0; i < metres.size(); ++i) {
-    const double per_range = range != nullptr ? 1.0 : static_cast<double>(lens.unit_vectors[3 * i + 2]);
+    const double per_range = range != nullptr ? 1.0 : static_cast<double>(lens.rays[3 * i + 2]);
     distance_mm[i] = countsOf(kMillimetres * static_cast<double>(metres[i]) / per_range);
   }
   return distance_mm;
@@ -63,8 +63,9 @@ FrameFacts factsOf(const Frame& frame) {
   return facts;
 }
 
-LensChunks lensChunksOf(const CameraInfo& camera) {
-  LensChunks lens{camera, unitVectorsOf(camera), {}, {}};
+LensChunks lensChunksOf(const CameraInfo& camera, const toftwin::o3d303::ExtrinsicCalibration& extrinsics) {
+  LensChunks lens{.camera = camera, .extrinsics = extrinsics, .rays = unitVectorsOf(camera)};
+  lens.unit_vectors = toftwin::o3d303::unitVectorsFrom(lens.rays, extrinsics);
   // fx fy mx my alpha k1 k2 k5 k3 k4, then the optics against the housing: none.
   const auto chunkOf = [&](const std::array<double, 5>& d) {
     std::array<float, 16> chunk{};
@@ -94,8 +95,12 @@ void describe(const Frame& frame, toftwin::o3d303::CameraFrame& wire) {
   wire.time_us = static_cast<std::uint32_t>(ns / 1000);
   const FrameFacts facts = factsOf(frame);
   for (std::size_t i = 0; i < facts.exposures_us.size(); ++i) wire.exposures_us[i] = facts.exposures_us[i];
-  constexpr float kNoSensor_c = 3276.7F;
-  wire.illumination_c = facts.illumination_c ? static_cast<float>(*facts.illumination_c) : kNoSensor_c;
+  const auto degrees = [](std::optional<double> value_c) {
+    return value_c ? static_cast<float>(*value_c) : toftwin::o3d303::CameraFrame::kNoSensor_c;
+  };
+  wire.illumination_c = degrees(facts.illumination_c);
+  wire.front1_c = degrees(facts.housing_c);
+  wire.processor_c = degrees(facts.processor_c);
 }
 
 }  // namespace
@@ -129,6 +134,7 @@ Result<CameraImages> imagesOf(const Frame& frame, const LensChunks& lens, double
   images.wire.amplitude = images.wire.raw_amplitude = images.amplitude;
   images.wire.confidence = images.confidence;
   images.wire.unit_vectors = lens.unit_vectors;
+  images.wire.extrinsics = lens.extrinsics;
   images.wire.intrinsics = lens.intrinsics;
   images.wire.inverse_intrinsics = lens.inverse_intrinsics;
   return images;
@@ -147,7 +153,7 @@ void clip(const Clipping& clipping, CameraImages& images) {
                 static_cast<double>(t[axis])) /
                kMillimetres;
       };
-      stays = clipping.hasPoint({p_m(2), -p_m(0), -p_m(1)});  // X forward, Y left, Z up
+      stays = clipping.hasPoint({p_m(0), p_m(1), p_m(2)});
     }
     if (stays) continue;
     images.distance_mm[i] = 0;

@@ -31,10 +31,12 @@ FrameFacts factsOf(const Frame& frame);
 /// Where the pixels of a camera look, in the forms in which this one tells it.
 struct LensChunks {
   CameraInfo camera;
-  std::vector<float> unit_vectors;
+  toftwin::o3d303::ExtrinsicCalibration extrinsics{};
+  std::vector<float> rays{};          ///< through the lens, three numbers per pixel
+  std::vector<float> unit_vectors{};  ///< the same as the extrinsics rotate them
   std::array<float, 16> intrinsics{}, inverse_intrinsics{};
 };
-LensChunks lensChunksOf(const CameraInfo& camera);
+LensChunks lensChunksOf(const CameraInfo& camera, const toftwin::o3d303::ExtrinsicCalibration& extrinsics);
 
 /// The camera's unit conversion (docs/facades/o3d303.md):
 ///   distance = round(1000 range / m), 0 where there is none or beyond 65535
@@ -44,8 +46,8 @@ LensChunks lensChunksOf(const CameraInfo& camera);
 /// depth.
 Result<CameraImages> imagesOf(const Frame& frame, const LensChunks& lens, double electrons_per_count);
 
-/// What lies beside the clipping becomes invalid, and clipped in the confidence. Points are where the
-/// extrinsics in `images.wire` put them.
+/// What lies beside the clipping becomes invalid, and clipped in the confidence. Points are those of the X, Y
+/// and Z images.
 void clip(const Clipping& clipping, CameraImages& images);
 
 }  // namespace toftwin::daemon::o3d303

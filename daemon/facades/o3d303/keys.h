@@ -23,7 +23,7 @@ struct MessageLineKeys : FrameLineKeys {
   }
 };
 
-enum class Timing { Source, Camera };
+enum class Timing { Camera, Fast };
 
 /// The keys of a [[facade]] table with kind = "o3d303".
 struct Keys {
@@ -34,7 +34,7 @@ struct Keys {
   std::string name = "toftwin";
   std::string password;
   double electrons_per_count = 6.0;
-  Timing timing = Timing::Source;
+  Timing timing = Timing::Camera;
   Temperature most_illumination = 90_degC;
   MessageLineKeys line;
 
@@ -53,10 +53,12 @@ struct Keys {
         "electrons_per_count", electrons_per_count, {1e-6, 1e9},
         "what one count of the camera's amplitude stands for in the source's unit; 6: the camera's usual "
         "MinimumAmplitude of 42 is sim:o3d303's 250 electrons; of sim:o3d303_binned 500 are 83");
-    v.choice(
-        "timing", timing, {{"source", Timing::Source}, {"camera", Timing::Camera}},
-        "when frames leave: as the source gives them, or as a real O3D303's did, set to these exposure "
-        "times, frequencies and this frame rate; such a camera leaves frames out when it cannot keep up");
+    v.choice("timing", timing, {{"camera", Timing::Camera}, {"fast", Timing::Fast}},
+             "camera: frames leave when a real O3D303's did, set to these exposure times, frequencies and "
+             "this frame "
+             "rate, some are left out when it cannot keep up, and a reboot takes 10 s unless boot_time_s "
+             "says how long; "
+             "fast: frames leave as the source gives them, and a reboot takes no time");
     v.quantity("most_illumination", most_illumination, celsius, {-40.0, 200.0},
                "clients are told the error 110004000 when the illumination gets hotter than that");
     v.group("line", line, "what goes wrong on purpose with the frames' messages");

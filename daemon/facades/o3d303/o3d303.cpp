@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <boost/asio/ip/host_name.hpp>
 #include <boost/asio/steady_timer.hpp>
 
 #include <fmt/format.h>
@@ -17,6 +18,7 @@
 #include "daemon/facades/held_frames.h"
 #include "daemon/facades/o3d303/device.h"
 #include "daemon/facades/o3d303/discovery.h"
+#include "daemon/facades/o3d303/frame_maker.h"
 #include "daemon/facades/o3d303/frame_timing.h"
 #include "daemon/facades/o3d303/http_server.h"
 #include "daemon/facades/o3d303/images.h"
@@ -95,6 +97,7 @@ class O3d303Facade final : public Facade {
               [this](const Frame& frame) { takeFrame(frame); }),
         line_(thread_.io(), LineFaults{keys_.line, name_, line_log}, keys_.line.delay_time,
               [this](const Frame& frame, const Damage& damage) { return publish(frame, damage); }),
+        maker_(keys_.electrons_per_count),
         held_(thread_.io(), name_, [this](const Frame& frame) { leave(frame); }),
         tick_(thread_.io(), kTick, [this] { tick(); }),
         boot_(thread_.io()),
@@ -111,6 +114,7 @@ class O3d303Facade final : public Facade {
     if (!pcic) return pcic.error();
     const int xmlrpc_port = xmlrpc->local_endpoint().port(), pcic_port = pcic->local_endpoint().port();
     const auto mac = macOf(place_.keys.source);
+    mac_ = textOf(mac);
     device_.emplace(Device::Identity{.name = keys_.name,
                                      .password = keys_.password,
                                      .mac = textOf(mac),
@@ -118,17 +122,22 @@ class O3d303Facade final : public Facade {
                                      .xmlrpc_port = xmlrpc_port,
                                      .pcic_port = pcic_port,
                                      .electrons_per_count = keys_.electrons_per_count});
-    http_.emplace(*std::move(xmlrpc), [this](std::string path, std::string body, HttpServer::Answer answer) {
-      ask(path, body, std::move(answer));
-    });
+    boost::system::error_code has_none;
+    http_.emplace(*std::move(xmlrpc),
+                  std::vector<std::string>{place_.keys.address, boost::asio::ip::host_name(has_none)},
+                  [this](std::string path, std::string body, HttpServer::Answer answer) {
+                    ask(path, body, std::move(answer));
+                  });
     pcic_.emplace(*std::move(pcic),
-                  PcicServer::Hooks{.trigger = [this](auto done) { trigger(std::move(done)); },
-                                    .default_schema = [this] { return device_->defaultSchema(); },
-                                    .ask = [this](std::string_view command) { return tellOfDevice(command); },
-                                    .connections = [this](std::size_t count) { noteConnections(count); },
-                                    .lasting_error = [this] {
-                                      return is_too_hot_ ? PcicError::kIlluminationTooHot : 0;
-                                    }});
+                  PcicServer::Hooks{
+                      .trigger = [this](auto done) { trigger(std::move(done)); },
+                      .default_schema = [this] { return device_->defaultSchema(); },
+                      .default_schema_text = [this] { return device_->defaultSchemaText(); },
+                      .ask = [this](std::string_view command) { return tellOfDevice(command); },
+                      .connections = [this](std::size_t count) { noteConnections(count); },
+                      .activate = [this](int index, auto done) { activate(index, std::move(done)); },
+                      .last_frame = [this] { return maker_.last(); },
+                      .lasting_error = [this] { return is_too_hot_ ? PcicError::kIlluminationTooHot : 0; }});
     if (keys_.discoverable) {
       auto discovery = Discovery::listen(thread_.io(), place_.keys.address,
                                          static_cast<std::uint16_t>(keys_.discovery_port),
@@ -176,7 +185,8 @@ class O3d303Facade final : public Facade {
     watchTemperature();
     noteConnections(connections_);
     if (connections_ == 0 || device_->isIdle()) return triggered_at_.reset();
-    if (keys_.timing == Timing::Source) return leave(frame);
+    adjustExposure(frame);
+    if (keys_.timing == Timing::Fast) return leave(frame);
     const auto later = timing_.next({device_ns}, {facts_.frequencies, facts_.exposures_us});
     if (!later) return triggered_at_.reset();
     // What the link held back has come when that let it go.
@@ -194,29 +204,24 @@ class O3d303Facade final : public Facade {
   /// Whether it went to anybody.
   bool publish(const Frame& frame, const Damage& damage) {
     if (device_->isIdle()) return false;
-    if (!lens_ || lens_->camera != frame.camera) {
-      lens_ = lensChunksOf(frame.camera);
-    }
-    auto images = imagesOf(frame, *lens_, keys_.electrons_per_count);
-    if (!images) return complainOnce(images.error()), false;
-    const auto t = device_->translation_mm();
-    images->wire.extrinsics = {t[0], t[1], t[2], 0.0F, 0.0F, 0.0F};
-    if (device_->clipping() != Clipping{}) clip(device_->clipping(), *images);
-    setClock(frame, images->wire);
-    return pcic_->publish(images->wire, damage);
+    const auto wire = maker_.make(frame, *device_);
+    if (!wire) return complainOnce(wire.error()), false;
+    return pcic_->publish(**wire, damage);
   }
 
-  /// The camera's clock is the source's until a client sets it, or has it follow the network's.
-  void setClock(const Frame& frame, toftwin::o3d303::CameraFrame& wire) const {
-    const ClockRelation& clock = frame.moment.clock;
-    std::int64_t shift_ns = device_->clockShift_s() * kNanoseconds;
-    if (device_->isSynchronised() && clock.uncertainty_ns >= 0) shift_ns = clock.host_minus_device_ns;
-    if (shift_ns == 0) return;
-    const std::int64_t ns = std::max<std::int64_t>(
-        0, std::int64_t{wire.time.seconds} * kNanoseconds + wire.time.nanoseconds + shift_ns);
-    wire.time = {static_cast<std::uint32_t>(ns / kNanoseconds),
-                 static_cast<std::uint32_t>(ns % kNanoseconds)};
-    wire.time_us = static_cast<std::uint32_t>(ns / 1000);
+  /// The source is set to the exposure that the frame asks for, if the application leaves it to the camera.
+  void adjustExposure(const Frame& frame) {
+    const auto control = device_->exposureControl();
+    if (!control || facts_.exposures_us.empty() || is_adjusting_) return;
+    const auto share = saturatedShareOf(frame, control->region);
+    if (!share) return;
+    const auto wanted_us = auto_exposure_.next(facts_.exposures_us.back(), *share, control->bounds);
+    if (!wanted_us) return;
+    is_adjusting_ = true;
+    change({{"exposure_us", *wanted_us}}, [this](const Result<>& done) {
+      is_adjusting_ = false;
+      if (!done) complainOnce(done.error());
+    });
   }
 
   void complainOnce(const Error& error) {
@@ -243,7 +248,7 @@ class O3d303Facade final : public Facade {
 
   void trigger(std::function<void(int)> done) {
     refresh();
-    if (device_->isIdle() || !can_trigger_) return done(PcicError::kNoTriggerAllowed);
+    if (!device_->isTriggeredByCommand()) return done(PcicError::kNoTriggerAllowed);
     const auto now = steady_clock::now();
     if (triggered_at_ && now - *triggered_at_ < kTriggerLost) return done(PcicError::kTriggerOverrun);
     triggered_at_ = now;
@@ -274,10 +279,28 @@ class O3d303Facade final : public Facade {
   void finish(const Device::Outcome& outcome, const Result<>& done, const HttpServer::Answer& answer) {
     refresh();
     answer(encodeXmlRpc(done ? outcome.answer : XmlRpcAnswer{faultOf(done.error())}));
-    if (!done || !outcome.has_saved) return;
+    if (done && outcome.has_saved) tellOfApplication();
+  }
+
+  void tellOfApplication() {
     const int index = device_->activeApplication();
     pcic_->tellNotification(kApplicationChanged,
                             fmt::format(R"({{"ID":{},"Index":{},"valid":true}})", 10'000 + index, index));
+  }
+
+  /// By the process interface: as if a client had made it active and saved that.
+  void activate(int index, std::function<void(bool)> done) {
+    refresh();
+    const auto before = std::make_shared<const Device>(*device_);
+    const auto outcome = device_->select(index);
+    if (!outcome) return done(false);
+    const auto conclude = [this, before, outcome, done](const Result<>& changed) {
+      if (!changed) device_.emplace(*before);
+      done(changed.ok());
+      refresh();
+      if (changed && outcome->has_saved) tellOfApplication();
+    };
+    outcome->changes.empty() ? conclude({}) : change(outcome->changes, conclude);
   }
 
   void change(const SourceChanges& changes, SourceLink::Done done) {
@@ -304,16 +327,14 @@ class O3d303Facade final : public Facade {
     facts.processor_c = facts_.processor_c;
     const auto up_since = booted_ ? *booted_ : powered_on_.value_or(began_);
     facts.since_power_on_s = std::chrono::duration<double>{steady_clock::now() - up_since}.count();
-    if (is_clock_known_) facts.host_s = place_.clock.wall().ns / kNanoseconds;
+    if (is_clock_known_) facts.host_ns = place_.clock.wall().ns;
     facts.device_s =
         device_s_ +
         std::chrono::duration_cast<std::chrono::seconds>(steady_clock::now() - device_s_at_).count();
     device_->update(facts);
   }
 
-  void tick() {
-    undo(device_->expire(steady_clock::now()));
-  }
+  void tick() { undo(device_->expire(steady_clock::now())); }
 
   /// What was set for a while.
   void undo(const SourceChanges& undone) {
@@ -340,8 +361,12 @@ class O3d303Facade final : public Facade {
     });
   }
 
+  /// As long as a real camera takes, unless the configuration says how long.
   [[nodiscard]] steady_clock::duration bootTime() const {
-    return std::chrono::nanoseconds{std::llround(place_.keys.boot_time.in(nanosecond))};
+    constexpr Duration kCameras = 10_s;
+    const bool is_said = place_.keys.boot_time > 0_s || keys_.timing == Timing::Fast;
+    return std::chrono::nanoseconds{
+        std::llround((is_said ? place_.keys.boot_time : kCameras).in(nanosecond))};
   }
 
   /// Nobody answers for the boot time, from which UpTime counts.
@@ -361,8 +386,17 @@ class O3d303Facade final : public Facade {
   std::string tellOfDevice(std::string_view command) {
     if (command == "V?") return "03 01 04";  // the version in use, the oldest and the newest
     if (command == "G?") {
-      return fmt::format("ifm electronic\tO3D303\t{}\t\t{}", device_->parameters().at("Name"),
-                         place_.keys.address);
+      const auto& all = device_->parameters();
+      const auto& network = device_->network();
+      return fmt::format("IFM ELECTRONIC\t{}\t{}\t\t{}\t{}\t{}\t{}\t{}\t{}\t{}", all.at("ArticleNumber"),
+                         all.at("Name"), all.at("Description"), place_.keys.address,
+                         network.at("StaticIPv4SubNetMask"), network.at("StaticIPv4Gateway"), mac_,
+                         network.at("UseDHCP") == "true" ? 1 : 0, http_->port());
+    }
+    if (command == "S?") {
+      const int active = device_->activeApplication();
+      if (active == 0) return "!";
+      return fmt::format("{0:010}\t{0:010}\t{1:010}", maker_.countOf(active), 0);
     }
     if (command == "A?") {
       const auto all = device_->applications();
@@ -376,7 +410,7 @@ class O3d303Facade final : public Facade {
   const Keys keys_;
   const FacadePlace place_;
   const std::string name_;
-  std::string where_;
+  std::string where_, mac_;
   EventThread thread_;
   SourceLink link_;
   std::optional<Device> device_;
@@ -385,18 +419,20 @@ class O3d303Facade final : public Facade {
   std::unique_ptr<Discovery> discovery_;
   StruckFrames line_;
   FrameTiming timing_;
+  FrameMaker maker_;
+  AutoExposure auto_exposure_;
   HeldFrames held_;
   Repeating tick_;
   boost::asio::steady_timer boot_;
   const steady_clock::time_point began_;
 
   std::size_t connections_ = 0;
-  bool has_seen_frame_ = false, can_trigger_ = false, is_too_hot_ = false, is_clock_known_ = false;
+  bool has_seen_frame_ = false, can_trigger_ = false, is_too_hot_ = false, is_clock_known_ = false,
+       is_adjusting_ = false;
   FrameFacts facts_;
   std::int64_t device_s_ = 0;  ///< of the last frame, which came
   steady_clock::time_point device_s_at_ = steady_clock::now();
   std::optional<steady_clock::time_point> powered_on_, booted_, triggered_at_;
-  std::optional<LensChunks> lens_;
   std::string last_complaint_;
 };
 

@@ -5,6 +5,7 @@
 
 #include <boost/asio/ip/tcp.hpp>
 
+#include <array>
 #include <functional>
 #include <list>
 #include <memory>
@@ -33,12 +34,18 @@ class PcicServer {
   struct Hooks {
     /// Asks for a frame and says later with which error it was refused, 0: it comes.
     std::function<void(std::function<void(int)>)> trigger;
-    /// What connections get that have asked for nothing.
+    /// What connections get that have asked for nothing, and its JSON.
     std::function<toftwin::o3d303::Schema()> default_schema;
+    std::function<std::string()> default_schema_text = [] { return std::string{}; };
     /// Answers to questions about the device ("G?"), or nothing for a command that is not known.
     std::function<std::string(std::string_view command)> ask;
     /// How many there are, whenever that changed.
     std::function<void(std::size_t)> connections;
+    /// Makes an application active and says later whether it could.
+    std::function<void(int index, std::function<void(bool)>)> activate =
+        [](int, const std::function<void(bool)>& done) { done(false); };
+    /// The one that was published last, until the next is; null: none was.
+    std::function<const toftwin::o3d303::CameraFrame*()> last_frame = [] { return nullptr; };
     /// The error that lasts, which a connection is told that did not hear it begin; 0: none does.
     std::function<int()> lasting_error = [] { return 0; };
   };
@@ -63,10 +70,13 @@ class PcicServer {
   void take(boost::asio::ip::tcp::socket socket);
   void tell(std::string_view ticket, unsigned output, std::string_view text);
   void remove(const std::shared_ptr<Connection>& connection);
+  [[nodiscard]] int freeNumber() const;
 
   const Hooks hooks_;
   bool is_open_ = true;
   int last_error_ = 0;
+  static constexpr int kWires = 2;
+  std::array<bool, kWires> wires_{};  ///< states of the camera's outputs, which nothing is tied to
   std::list<std::shared_ptr<Connection>> connections_;  // shared with their handlers
   const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
   Accepting accepting_;

@@ -15,8 +15,22 @@ namespace {
 using toftwin::o3d303::XmlRpcAnswer;
 using toftwin::o3d303::XmlRpcValue;
 
-constexpr Bounds kName{0, 64}, kDescription{0, 500}, kDocument{0, 65'536};
-constexpr Bounds kTranslation_mm{-10'000, 10'000};
+constexpr Bounds kName{0, 64}, kDescription{0, 500}, kDocument{0, 65'536}, kShare{0, 100};
+/// The camera's own, in our words: what a camera gives that nobody has told anything.
+constexpr std::string_view kFactorySchema =
+    R"({ "layouter": "flexible", "format": { "dataencoding": "ascii" }, "elements": [ )"
+    R"({ "type": "string", "value": "star", "id": "start_string" }, )"
+    R"({ "type": "blob", "id": "normalized_amplitude_image" }, { "type": "blob", "id": "distance_image" }, )"
+    R"({ "type": "blob", "id": "x_image" }, { "type": "blob", "id": "y_image" }, { "type": "blob", "id": "z_image" }, )"
+    R"({ "type": "blob", "id": "confidence_image" }, { "type": "blob", "id": "diagnostic_data" }, )"
+    R"({ "type": "string", "value": "stop", "id": "end_string" } ] })";
+constexpr std::string_view kFieldbusSchema =
+    R"({ "layouter": "flexible", "format": { "dataencoding": "binary", "order": "big" }, "elements": [ ] })";
+constexpr std::string_view kLogicGraph = R"({"IOMap": {}, "blocks": {}, "connectors": {}})";
+constexpr std::string_view kOverlayStyle = R"({"ROI": {}})";
+constexpr std::string_view kExposureRegion =
+    R"({"ROIs":[{"id":0,"group":0,"type":"Rect","width":130,"height":100,"angle":0,"center_x":88,"center_y":66}]})";
+constexpr Bounds kTranslation_mm{-10'000, 10'000}, kRotation_deg{-180, 180};
 
 }  // namespace
 
@@ -28,26 +42,30 @@ std::span<const Rule> deviceRules() {
       Rule{"ArticleStatus", "AA"},
       Rule{"Description", "", Text, kDescription},
       Rule{"DeviceType", "1:2"},
+      Rule{"EIPConsumingSize", "8", Whole, {8, 450}},
+      Rule{"EIPProducingSize", "450", Whole, {8, 450}},
+      Rule{"EnableAcquisitionFinishedPCIC", "false", Switch},
       Rule{"EthernetFieldBus", "1", Whole, {0, 2}},
       Rule{"EthernetFieldBusEndianness", "0", Whole, {0, 1}},
       Rule{"EvaluationFinishedMinHoldTime", "10", Whole, {0, 60'000}},
-      Rule{"ExtrinsicCalibRotX", "0"},
-      Rule{"ExtrinsicCalibRotY", "0"},
-      Rule{"ExtrinsicCalibRotZ", "0"},
+      Rule{"ExtrinsicCalibRotX", "0", Real, kRotation_deg},
+      Rule{"ExtrinsicCalibRotY", "0", Real, kRotation_deg},
+      Rule{"ExtrinsicCalibRotZ", "0", Real, kRotation_deg},
       Rule{"ExtrinsicCalibTransX", "0", Real, kTranslation_mm},
       Rule{"ExtrinsicCalibTransY", "0", Real, kTranslation_mm},
       Rule{"ExtrinsicCalibTransZ", "0", Real, kTranslation_mm},
       Rule{"IODebouncing", "true", Switch},
-      Rule{"IOExternApplicationSwitch", "0", Whole, {0, 3}},
+      Rule{"IOExternApplicationSwitch", "0", Whole, {0, 4}},
       Rule{"IOLogicType", "1", Whole, {0, 1}},
       Rule{"IPAddressConfig", "0"},
       Rule{"ImageTimestampReference", "0"},
       Rule{"Name", "", Text, kName},
       Rule{"OperatingMode", "0"},
-      Rule{"PNIODeviceName", "", Text, kName},
+      Rule{"PNIODeviceName", "", Text, {0, 127}},
       Rule{"PasswordActivated", "false"},
       Rule{"PcicProtocolVersion", "3"},
       Rule{"PcicTcpPort", "50010"},
+      Rule{"PcicTcpSchemaAutoUpdate", "false", Switch},
       Rule{"SaveRestoreStatsOnApplSwitch", "true", Switch},
       Rule{"ServiceReportFailedBuffer", "15", Whole, {0, 100}},
       Rule{"ServiceReportPassedBuffer", "15", Whole, {0, 100}},
@@ -92,11 +110,12 @@ std::span<const Rule> applicationRules() {
   using enum Rule::Kind;
   static constexpr std::array kRules{
       Rule{"Description", "", Text, kDescription},
-      Rule{"LogicGraph", "{}", Text, kDocument},
+      Rule{"LogicGraph", kLogicGraph, Text, kDocument},
       Rule{"Name", "Sample Application", Text, kName},
-      Rule{"PcicEipResultSchema", "", Text, kDocument},
-      Rule{"PcicPnioResultSchema", "", Text, kDocument},
-      Rule{"PcicTcpResultSchema", "", Special},
+      Rule{"PcicEipResultSchema", kFieldbusSchema, Text, kDocument},
+      Rule{"PcicPnioResultSchema", kFieldbusSchema, Text, kDocument},
+      Rule{"PcicTcpResultSchema", kFactorySchema, Special},
+      Rule{"RtspOverlayStyle", kOverlayStyle, Text, kDocument},
       Rule{"TemplateInfo", "", Text, kDocument},
       Rule{"TriggerMode", "1", Special},
       Rule{"Type", "Camera"},
@@ -107,10 +126,11 @@ std::span<const Rule> applicationRules() {
 std::span<const Rule> imagerRules() {
   using enum Rule::Kind;
   static constexpr std::array kRules{
-      Rule{"AutoExposureMaxExposureTime", "10000"},
-      Rule{"AutoExposureReferencePointX", "88"},
-      Rule{"AutoExposureReferencePointY", "66"},
-      Rule{"AutoExposureReferenceType", "0"},
+      Rule{"AutoExposureMaxExposureTime", "10000", Whole, {1, 10'000}},
+      Rule{"AutoExposureReferencePointX", "88", Whole, {0, 352}},
+      Rule{"AutoExposureReferencePointY", "66", Whole, {0, 264}},
+      Rule{"AutoExposureReferenceROI", kExposureRegion, Special},
+      Rule{"AutoExposureReferenceType", "0", Whole, {0, 1}},
       Rule{"Channel", "0", Source, {0, 3}},
       Rule{"ClippingBottom", "131", Special},
       Rule{"ClippingCuboid",
@@ -121,28 +141,28 @@ std::span<const Rule> imagerRules() {
       Rule{"ClippingRight", "175", Special},
       Rule{"ClippingTop", "0", Special},
       Rule{"ContinuousAutoExposure", "false", Special},
-      Rule{"ContinuousUserFrameCalibration", "false"},
-      Rule{"EnableAmplitudeCorrection", "true"},
-      Rule{"EnableFastFrequency", "false"},
+      Rule{"ContinuousUserFrameCalibration", "false", Switch},
+      Rule{"EnableAmplitudeCorrection", "true", Switch},
+      Rule{"EnableFastFrequency", "false", Switch},
       Rule{"EnableFilterAmplitudeImage", "true", Source, {0, 1}},
       Rule{"EnableFilterDistanceImage", "true", Source, {0, 1}},
-      Rule{"EnableRectificationAmplitudeImage", "false"},
-      Rule{"EnableRectificationDistanceImage", "false"},
+      Rule{"EnableRectificationAmplitudeImage", "false", Switch},
+      Rule{"EnableRectificationDistanceImage", "false", Switch},
       Rule{"ExposureTime", "1000", Source, {1, 10'000}},
       Rule{"ExposureTimeList", "1000"},
       Rule{"ExposureTimeRatio", "40", Source, {2, 50}},
       Rule{"FrameRate", "5", Source, {0.0167, 30}},
       Rule{"MaxAllowedLEDFrameRate", "30"},
       Rule{"MinimumAmplitude", "42", Source, {0, 65'535}},
-      Rule{"Resolution", "0"},
+      Rule{"Resolution", "0", Special},
       Rule{"SpatialFilterType", "0", Source, {0, 3}},
       Rule{"SymmetryThreshold", "0.4", Source, {0, 1000}},
       Rule{"TemporalFilterType", "0", Source, {0, 2}},
-      Rule{"ThreeFreqMax2FLineDistPercentage", "80"},
-      Rule{"ThreeFreqMax3FLineDistPercentage", "80"},
-      Rule{"TwoFreqMaxLineDistPercentage", "80"},
+      Rule{"ThreeFreqMax2FLineDistPercentage", "80", Real, kShare},
+      Rule{"ThreeFreqMax3FLineDistPercentage", "80", Real, kShare},
+      Rule{"TwoFreqMaxLineDistPercentage", "80", Real, kShare},
       Rule{"Type", "under5m_low"},
-      Rule{"UseSimpleBinning", "false"},
+      Rule{"UseSimpleBinning", "false", Switch},
   };
   return kRules;
 }

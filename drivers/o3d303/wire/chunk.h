@@ -19,10 +19,10 @@ enum class ChunkType : std::uint32_t {
   Amplitude = 101,  ///< normalised by exposure, if the camera is set to
   RawAmplitude = 103,
   DistanceNoise = 105,
-  X = 200,
+  X = 200,  ///< X right, Y down and Z forward, in millimetres: extrinsics.h
   Y = 201,
   Z = 202,
-  UnitVectors = 223,  ///< per pixel: x right, y down, z forward
+  UnitVectors = 223,  ///< per pixel: x right, y down, z forward, rotated as extrinsics.h says
   Confidence = 300,
   Diagnostic = 302,
   Extrinsics = 400,  ///< tx ty tz in millimetres, rx ry rz in degrees

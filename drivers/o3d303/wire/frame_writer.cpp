@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
+#include <utility>
 #include <vector>
 
 namespace toftwin::o3d303 {
@@ -26,17 +28,16 @@ void appendImage(Bytes& bytes, const CameraFrame& frame, ChunkType type, Element
               std::as_bytes(std::span{elements}));
 }
 
-/// p = e d + t in millimetres; the camera calls z forward X, -x Y and -y Z. Invalid pixels are 0.
+/// p = e d + t in millimetres, as it is: x right, y down, z forward. Invalid pixels are 0.
 std::vector<std::int16_t> coordinate(const CameraFrame& frame, ChunkType type) {
-  const std::size_t axis = type == ChunkType::X ? 2 : type == ChunkType::Y ? 0 : 1;
-  const float sign = type == ChunkType::X ? 1.0F : -1.0F;
+  const std::size_t axis = type == ChunkType::X ? 0 : type == ChunkType::Y ? 1 : 2;
   std::vector<std::int16_t> image(frame.distance_mm.size());
   for (std::size_t i = 0; i < image.size(); ++i) {
     const float distance = frame.distance_mm[i];
     if (distance == 0.0F || (frame.confidence[i] & 1U) != 0) continue;
     const float p = frame.unit_vectors[3 * i + axis] * distance + frame.extrinsics[axis];
     constexpr float kMost = std::numeric_limits<std::int16_t>::max();
-    image[i] = static_cast<std::int16_t>(std::lround(std::clamp(sign * p, -kMost, kMost)));
+    image[i] = static_cast<std::int16_t>(std::lround(std::clamp(p, -kMost, kMost)));
   }
   return image;
 }
@@ -44,6 +45,16 @@ std::vector<std::int16_t> coordinate(const CameraFrame& frame, ChunkType type) {
 /// What the camera's application made of the frame: one of type "Camera" only takes it.
 std::string modelOf(const CameraFrame& frame) {
   return fmt::format(R"({{"Type":"Camera","FrameCount":{}}})", frame.frame_count);
+}
+
+/// How the camera was while it took the frame: temperatures in tenths of a degree, evaluation time in
+/// milliseconds, frame rate in hertz, 32 bits each. [ifm/o3d3xx-python, pcic/image_client.py]
+std::array<std::int32_t, 6> diagnosticOf(const CameraFrame& f) {
+  constexpr float kTenths = 10.0F;
+  const auto tenths = [](float celsius) { return static_cast<std::int32_t>(std::lround(kTenths * celsius)); };
+  const auto whole = [](double number) { return static_cast<std::int32_t>(std::lround(number)); };
+  return {tenths(f.illumination_c), tenths(f.front1_c),     tenths(f.front2_c),
+          tenths(f.processor_c),    whole(f.evaluation_ms), whole(f.frame_rate_hz)};
 }
 
 bool appendBlob(Bytes& bytes, std::string_view id, const CameraFrame& f) {
@@ -70,8 +81,44 @@ bool appendBlob(Bytes& bytes, std::string_view id, const CameraFrame& f) {
   if (id == kInverseIntrinsicsBlob) {
     return appendImage(bytes, f, InverseIntrinsics, Format::F32, f.inverse_intrinsics, false), true;
   }
+  if (id == kDiagnosticBlob) return appendImage(bytes, f, Diagnostic, Format::S32, diagnosticOf(f), false), true;
   if (id == kJsonBlob) return appendImage(bytes, f, Json, Format::U8, modelOf(f), false), true;
   return false;
+}
+
+std::optional<double> numberNamed(std::string_view id, const CameraFrame& f) {
+  const std::pair<std::string_view, double> known[] = {{"exposure_time_1", f.exposures_us[0]},
+                                                       {"exposure_time_2", f.exposures_us[1]},
+                                                       {"exposure_time_3", f.exposures_us[2]},
+                                                       {"temp_illu", f.illumination_c},
+                                                       {"temp_front1", f.front1_c},
+                                                       {"temp_front2", f.front2_c},
+                                                       {"temp_imx6", f.processor_c},
+                                                       {"evaltime", f.evaluation_ms},
+                                                       {"framerate", f.frame_rate_hz},
+                                                       {"activeapp_id", f.active_application}};
+  for (const auto& [name, number] : known) {
+    if (name == id) return number;
+  }
+  return std::nullopt;
+}
+
+/// False if the camera has nothing of that name.
+bool appendElement(Bytes& bytes, const SchemaElement& element, const CameraFrame& frame) {
+  switch (element.kind) {
+    case SchemaElement::Kind::Text:
+      appendText(bytes, element.value);
+      return true;
+    case SchemaElement::Kind::Blob:
+      return appendBlob(bytes, element.id, frame);
+    case SchemaElement::Kind::Records:
+      return element.id == "models";  // of which an application of type Camera has none
+    case SchemaElement::Kind::Number:
+      break;
+  }
+  const auto number = numberNamed(element.id, frame);
+  if (number) appendFormatted(bytes, *number, element.type, element.format);
+  return number.has_value();
 }
 
 }  // namespace
@@ -79,32 +126,9 @@ bool appendBlob(Bytes& bytes, std::string_view id, const CameraFrame& f) {
 Result<Bytes> writeFrameContent(const Schema& schema, const CameraFrame& frame) {
   Bytes bytes;
   for (const SchemaElement& element : schema) {
-    bool is_known = true;
-    switch (element.type) {
-      case SchemaElement::Type::Text:
-        appendText(bytes, element.value);
-        break;
-      case SchemaElement::Type::Blob:
-        is_known = appendBlob(bytes, element.id, frame);
-        break;
-      case SchemaElement::Type::Float32:
-        is_known = element.id == "temp_illu";
-        appendNumber(bytes, frame.illumination_c);
-        break;
-      case SchemaElement::Type::UInt32: {
-        constexpr std::string_view ids[] = {"exposure_time_1", "exposure_time_2",
-                                            "exposure_time_3"};
-        const auto* found = std::ranges::find(ids, element.id);
-        is_known = found != std::end(ids);
-        if (is_known)
-          appendNumber(bytes, frame.exposures_us[static_cast<std::size_t>(found - ids)]);
-        break;
-      }
-    }
-    if (!is_known) {
-      return Error{Error::Code::Unsupported,
-                   fmt::format("PCIC schema: \"{}\" is nothing that this camera has", element.id)};
-    }
+    if (appendElement(bytes, element, frame)) continue;
+    return Error{Error::Code::Unsupported,
+                 fmt::format("PCIC schema: \"{}\" is nothing that this camera has", element.id)};
   }
   return bytes;
 }

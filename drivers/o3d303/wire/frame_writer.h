@@ -8,6 +8,7 @@
 #include <toftwin/result.h>
 
 #include "drivers/o3d303/wire/chunk.h"
+#include "drivers/o3d303/wire/extrinsics.h"
 #include "drivers/o3d303/wire/schema.h"
 
 namespace toftwin::o3d303 {
@@ -24,11 +25,15 @@ struct CameraFrame {
   std::span<const std::uint16_t> amplitude;    ///< normalised
   std::span<const std::uint16_t> raw_amplitude;
   std::span<const std::uint8_t> confidence;  ///< confidence.h
-  std::span<const float> unit_vectors;       ///< three per pixel: x right, y down, z forward
-  std::array<float, 6> extrinsics{};         ///< mm, degrees
+  std::span<const float> unit_vectors;       ///< three per pixel, rotated as extrinsics.h says
+  ExtrinsicCalibration extrinsics{};
   std::array<float, 16> intrinsics{}, inverse_intrinsics{};
   std::array<std::uint32_t, 3> exposures_us{};
-  float illumination_c = 0.0F;
+  static constexpr float kNoSensor_c = 3276.7F;  ///< what the camera says of a temperature that it lacks
+  float illumination_c = kNoSensor_c, front1_c = kNoSensor_c, front2_c = kNoSensor_c,
+        processor_c = kNoSensor_c;
+  double evaluation_ms = 0.0, frame_rate_hz = 0.0;
+  int active_application = 0;
 };
 
 /// The content of a frame's PCIC message. Unsupported if the schema asks for what is not known.

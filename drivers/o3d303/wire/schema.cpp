@@ -5,7 +5,6 @@
 
 #include <array>
 #include <boost/property_tree/json_parser.hpp>
-#include <optional>
 #include <sstream>
 #include <utility>
 
@@ -14,27 +13,32 @@
 namespace toftwin::o3d303 {
 namespace {
 
-using Type = SchemaElement::Type;
+using Kind = SchemaElement::Kind;
 
 constexpr std::size_t kLongest = 65'536;
-constexpr int kDeepestBracket = 8;  // the JSON reader recurses: deeper texts would end on the stack
-constexpr std::array<std::pair<Type, std::string_view>, 4> kTypes{{{Type::Text, "string"},
-                                                                   {Type::Blob, "blob"},
-                                                                   {Type::UInt32, "uint32"},
-                                                                   {Type::Float32, "float32"}}};
+constexpr int kDeepestBracket = 16;  // the JSON reader recurses: deeper texts would end on the stack
 
-std::string_view nameOf(Type type) {
-  for (const auto& [known, name] : kTypes) {
-    if (known == type) return name;
+struct TypeName {
+  std::string_view name;
+  Kind kind;
+  NumberType type = NumberType::UInt32;
+};
+constexpr std::array kTypes{TypeName{"string", Kind::Text},
+                            TypeName{"blob", Kind::Blob},
+                            TypeName{"records", Kind::Records},
+                            TypeName{"uint8", Kind::Number, NumberType::UInt8},
+                            TypeName{"int8", Kind::Number, NumberType::Int8},
+                            TypeName{"uint16", Kind::Number, NumberType::UInt16},
+                            TypeName{"int16", Kind::Number, NumberType::Int16},
+                            TypeName{"uint32", Kind::Number, NumberType::UInt32},
+                            TypeName{"int32", Kind::Number, NumberType::Int32},
+                            TypeName{"float32", Kind::Number, NumberType::Float32}};
+
+std::string_view nameOf(const SchemaElement& element) {
+  for (const TypeName& one : kTypes) {
+    if (one.kind == element.kind && (one.kind != Kind::Number || one.type == element.type)) return one.name;
   }
   return {};
-}
-
-std::optional<Type> typeNamed(std::string_view name) {
-  for (const auto& [type, known] : kTypes) {
-    if (known == name) return type;
-  }
-  return std::nullopt;
 }
 
 bool isTooDeep(std::string_view json) {
@@ -46,36 +50,65 @@ bool isTooDeep(std::string_view json) {
   return false;
 }
 
-Result<Schema> readElements(const boost::property_tree::ptree& tree) {
+using Tree = boost::property_tree::ptree;
+
+/// The format of an element, whose own property goes before the schema's.
+Result<NumberFormat> formatOf(const Tree& element, const NumberFormat& otherwise) {
+  const auto property = element.get_child_optional("format");
+  return property ? formatWith(otherwise, *property) : Result<NumberFormat>{otherwise};
+}
+
+Result<Schema> readElements(const Tree& tree, const NumberFormat& common) {
   const auto elements = tree.get_child_optional("elements");
   if (!elements) return Error{Error::Code::Malformed, "PCIC schema: it has no \"elements\""};
   Schema schema;
   for (const auto& [key, element] : *elements) {
     const auto name = element.get<std::string>("type", "");
-    const auto type = typeNamed(name);
-    if (!type) {
+    const auto* type = std::ranges::find(kTypes, name, &TypeName::name);
+    if (type == kTypes.end()) {
       return Error{Error::Code::Unsupported,
                    fmt::format("PCIC schema: elements of type \"{}\" are not known", name)};
     }
-    schema.push_back({.type = *type,
+    auto format = formatOf(element, common);
+    if (!format) return format.error();
+    if (type->kind == Kind::Records) {
+      if (auto records = readElements(element, *format); !records) return records.error();
+    }
+    schema.push_back({.kind = type->kind,
                       .id = element.get<std::string>("id", ""),
-                      .value = element.get<std::string>("value", "")});
+                      .value = element.get<std::string>("value", ""),
+                      .type = type->type,
+                      .format = *format});
   }
   return schema;
 }
 
+/// As the camera's own clients ask for numbers.
+SchemaElement binaryNumber(std::string id, NumberType type) {
+  return {.kind = Kind::Number,
+          .id = std::move(id),
+          .type = type,
+          .format = {.encoding = NumberFormat::Encoding::Binary}};
+}
+
 }  // namespace
 
+SchemaElement SchemaElement::text(std::string id, std::string value) {
+  return {.kind = Kind::Text, .id = std::move(id), .value = std::move(value)};
+}
+
+SchemaElement SchemaElement::blob(std::string_view id) { return {.kind = Kind::Blob, .id = std::string{id}}; }
+
 Schema schemaOf(const std::vector<std::string_view>& blobs) {
-  Schema schema{{Type::Text, "start_string", std::string{kFrameBegin}}};
-  for (const std::string_view blob : blobs) schema.push_back({Type::Blob, std::string{blob}, {}});
+  Schema schema{SchemaElement::text("start_string", std::string{kFrameBegin})};
+  for (const std::string_view blob : blobs) schema.push_back(SchemaElement::blob(blob));
   // The temperature before the exposures: the other way round the vendor's own client misses it.
-  schema.push_back({Type::Text, "temp_illu_marker", std::string{kIlluminationMarker}});
-  schema.push_back({Type::Float32, "temp_illu", {}});
-  schema.push_back({Type::Text, "exposure_times", std::string{kExposuresMarker}});
+  schema.push_back(SchemaElement::text("temp_illu_marker", std::string{kIlluminationMarker}));
+  schema.push_back(binaryNumber("temp_illu", NumberType::Float32));
+  schema.push_back(SchemaElement::text("exposure_times", std::string{kExposuresMarker}));
   for (int i = 1; i <= 3; ++i)
-    schema.push_back({Type::UInt32, fmt::format("exposure_time_{}", i), {}});
-  schema.push_back({Type::Text, "end_string", std::string{kFrameEnd}});
+    schema.push_back(binaryNumber(fmt::format("exposure_time_{}", i), NumberType::UInt32));
+  schema.push_back(SchemaElement::text("end_string", std::string{kFrameEnd}));
   return schema;
 }
 
@@ -83,11 +116,9 @@ std::string toJson(const Schema& schema) {
   std::string elements;
   for (const SchemaElement& element : schema) {
     elements += fmt::format("{}{{\"type\":\"{}\",\"id\":\"{}\"", elements.empty() ? "" : ",",
-                            nameOf(element.type), element.id);
-    if (element.type == Type::Text) elements += fmt::format(",\"value\":\"{}\"", element.value);
-    if (element.type == Type::UInt32 || element.type == Type::Float32) {
-      elements += R"(,"format":{"dataencoding":"binary","order":"little"})";
-    }
+                            nameOf(element), element.id);
+    if (element.kind == Kind::Text) elements += fmt::format(",\"value\":\"{}\"", element.value);
+    if (element.kind == Kind::Number) elements += R"(,"format":{"dataencoding":"binary","order":"little"})";
     elements += '}';
   }
   return R"({"layouter":"flexible","format":{"dataencoding":"ascii"},"elements":[)" + elements +
@@ -98,14 +129,21 @@ Result<Schema> readSchema(std::string_view json) {
   if (json.size() > kLongest || isTooDeep(json)) {
     return Error{Error::Code::TooLarge, "PCIC schema: too long or nested too deeply"};
   }
-  boost::property_tree::ptree tree;
+  Tree tree;
   std::istringstream text{std::string{json}};
   try {
     boost::property_tree::read_json(text, tree);
   } catch (const boost::property_tree::ptree_error& e) {
     return Error{Error::Code::Malformed, fmt::format("PCIC schema: {}", e.what())};
   }
-  return readElements(tree);
+  const auto layouter = tree.get<std::string>("layouter", "flexible");
+  if (layouter != "flexible") {
+    return Error{Error::Code::Unsupported,
+                 fmt::format("PCIC schema: the layouter \"{}\" is not known; ask for \"flexible\"", layouter)};
+  }
+  const auto common = formatOf(tree, {});
+  if (!common) return common.error();
+  return readElements(tree, *common);
 }
 
 }  // namespace toftwin::o3d303

@@ -1,21 +1,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include <toftwin/result.h>
 
+#include "drivers/o3d303/wire/number_format.h"
+
 /// The schema: what a frame consists of, asked for by each PCIC connection in JSON.
 namespace toftwin::o3d303 {
 
 struct SchemaElement {
-  enum class Type { Text, Blob, UInt32, Float32 };
-  Type type = Type::Blob;
-  std::string id;     ///< of a blob: what it shows
-  std::string value;  ///< of a text: the text itself
+  enum class Kind { Text, Blob, Number, Records };
+  Kind kind = Kind::Blob;
+  std::string id{};     ///< of a blob: what it shows; of a number: what it counts
+  std::string value{};  ///< of a text: the text itself
+  NumberType type = NumberType::UInt32;
+  NumberFormat format{};
   bool operator==(const SchemaElement&) const = default;
+
+  static SchemaElement text(std::string id, std::string value);
+  static SchemaElement blob(std::string_view id);
 };
 using Schema = std::vector<SchemaElement>;
 
@@ -34,8 +42,10 @@ inline constexpr std::string_view kDistanceBlob = "distance_image",
 /// Those blobs between "star" and "stop", with exposure times and illumination temperature.
 Schema schemaOf(const std::vector<std::string_view>& blobs);
 
+/// For schemas of texts without quotes, of blobs, and of numbers in binary, little end first: those that the
+/// functions above make.
 std::string toJson(const Schema& schema);
-/// Any text is safe. Element types other than the four above are Unsupported.
+/// Any text is safe. Unsupported: a type of elements, a layouter or a format that the camera does not have.
 Result<Schema> readSchema(std::string_view json);
 
 }  // namespace toftwin::o3d303

@@ -160,10 +160,10 @@ TEST_F(CrossDialect, SoAreThoseOfACamerasDriver) {
   xmlrpc_ = freePort();
   start(fmt::format(
       "[[source]]\nname = 'sim'\n{}\n[[facade]]\nkind = 'o3d303'\nsource = 'sim'\nxmlrpc_port = {}\n"
-      "pcic_port = 0\ndiscoverable = false\n"
+      "pcic_port = 0\ndiscoverable = false\ntiming = 'fast'\n"
       "[[source]]\nname = 'cam'\ndriver = 'o3d303'\nuri = 'o3d303:127.0.0.1:{}'\n"
       "[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\npcic_port = 0\n"
-      "discoverable = false\nelectrons_per_count = 1.0\n",
+      "discoverable = false\ntiming = 'fast'\nelectrons_per_count = 1.0\n",
       kSmallSim, camera, camera, xmlrpc_));
   electrons_per_count_ = 1.0;  // the source has counts already
   expectOneTruth("cam", FrameKind::Real);

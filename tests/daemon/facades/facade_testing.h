@@ -22,13 +22,15 @@ namespace toftwin::daemon::test {
 /// A daemon with a source "cam" and a facade before it.
 class RunningFacade : public RunningDaemon {
  protected:
-  /// With an O3D303 at `xmlrpc_` before the source of those keys.
+  /// With an O3D303 at `xmlrpc_` before the source of those keys, whose frames leave as they come unless the
+  /// keys say otherwise.
   void startO3d303(const std::string& source_keys, const std::string& facade_keys = {}) {
     xmlrpc_ = freePort();
+    const bool says_timing = facade_keys.find("timing =") != std::string::npos;
     start(fmt::format(
         "[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\n"
-        "pcic_port = 0\ndiscoverable = false\n{}\n",
-        source_keys, xmlrpc_, facade_keys));
+        "pcic_port = 0\ndiscoverable = false\n{}{}\n",
+        source_keys, xmlrpc_, says_timing ? "" : "timing = 'fast'\n", facade_keys));
   }
   /// Our own driver, as it is, at the facade.
   Result<std::unique_ptr<drivers::Source>> openDriver(const std::string& keys = {}) {

@@ -41,7 +41,7 @@ o3d303::XmlRpcAnswer O3d303Client::ask(const std::string& object, const std::str
   const std::string body = encodeXmlRpc(o3d303::XmlRpcCall{method, std::move(params)});
   RawHttp http{xmlrpc_};
   http.send(
-      fmt::format("POST /api/rpc/v1/com.ifm.efector/{} HTTP/1.1\r\nHost: x\r\nConnection: close\r\n"
+      fmt::format("POST /api/rpc/v1/com.ifm.efector/{} HTTP/1.1\r\nHost: 127.0.0.1\r\nContent-Type: text/xml\r\nConnection: close\r\n"
                   "Content-Length: {}\r\n\r\n{}",
                   object, body.size(), body));
   const std::string answer = http.receiveAll();

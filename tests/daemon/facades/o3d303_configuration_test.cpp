@@ -67,7 +67,7 @@ TEST_F(O3d303Configuration, AnApplicationHasTheRealOnesParametersWithTheirLimits
   for (const auto& [name, value] : parameters) names.push_back(name);
   EXPECT_THAT(names, UnorderedElementsAre("Name", "Description", "TriggerMode", "PcicTcpResultSchema",
                                           "PcicEipResultSchema", "PcicPnioResultSchema", "TemplateInfo",
-                                          "Type", "LogicGraph"));
+                                          "Type", "LogicGraph", "RtspOverlayStyle"));
   EXPECT_EQ(faultOf(kApplication, "setParameter", {"Name", std::string(64, 'n')}), 0);
   EXPECT_EQ(faultOf(kApplication, "setParameter", {"Name", std::string(65, 'n')}), Fault::kOutOfRange);
   EXPECT_EQ(faultOf(kApplication, "setParameter", {"Description", std::string(500, 'n')}), 0);
@@ -183,8 +183,12 @@ TEST_F(O3d303Configuration, TheImagerRefusesByTheVendorsNumbers) {
   EXPECT_EQ(faultOf(kImager, "setParameter", {"SpatialFilterType", "4"}), Fault::kOutOfRange);
   EXPECT_EQ(faultOf(kImager, "setParameter", {"SpatialFilterType", "on"}), Fault::kWrongType);
   EXPECT_EQ(faultOf(kImager, "setParameter", {"EnableFilterDistanceImage", "2"}), Fault::kWrongType);
-  EXPECT_EQ(faultOf(kImager, "setParameter", {"ContinuousAutoExposure", "true"}), Fault::kNoAutoExposure);
-  EXPECT_EQ(faultOf(kImager, "setParameter", {"EnableRectificationDistanceImage", "true"}), Fault::kReadOnly);
+  EXPECT_EQ(faultOf(kImager, "setParameter", {"ContinuousAutoExposure", "maybe"}), Fault::kWrongType);
+  EXPECT_EQ(faultOf(kImager, "setParameter", {"AutoExposureReferenceROI", "{}"}), Fault::kWrongFormat);
+  EXPECT_EQ(faultOf(kImager, "setParameter", {"TwoFreqMaxLineDistPercentage", "101"}), Fault::kOutOfRange);
+  EXPECT_EQ(faultOf(kImager, "setParameter", {"Resolution", "1"}), Fault::kOutOfRange)
+      << "the source has 176 columns";
+  EXPECT_EQ(faultOf(kApplication, "setParameter", {"TriggerMode", "6"}), Fault::kOutOfRange);
   EXPECT_EQ(faultOf(kImager, "setParameter", {"Channel", "1"}), Fault::kReadOnly) << "this source has none";
   EXPECT_EQ(faultOf(kImager, "setParameter", {"ExposureTimeRatio", "5"}), Fault::kNoSuchParameter)
       << "of one exposure";

@@ -25,7 +25,7 @@ using toftwin::o3d303::toBase64;
 
 TEST_F(O3d303Configuration, TheDeviceHasTheRealOnesParameters) {
   const Parameters parameters = all("/");
-  EXPECT_EQ(parameters.size(), 34u);
+  EXPECT_EQ(parameters.size(), 38u) << "as in the published configuration of firmware 1.23";
   for (const auto& [name, value] : parameters) EXPECT_EQ(call("/", "getParameter", {name}).text(), value);
   EXPECT_EQ(faultOf("/", "getParameter", {"Bogus Parameter"}), Fault::kNoSuchParameter);
 }
@@ -49,7 +49,10 @@ TEST_F(O3d303Configuration, DeviceParametersAreOfTheirTypeAndRange) {
                              {"SessionTimeout", "300", 0},
                              {"ExtrinsicCalibTransX", "12.5", 0},
                              {"ExtrinsicCalibTransX", "1e5", Fault::kOutOfRange},
-                             {"ExtrinsicCalibRotX", "5", Fault::kReadOnly},
+                             {"ExtrinsicCalibRotX", "5", 0},
+                             {"ExtrinsicCalibRotX", "181", Fault::kOutOfRange},
+                             {"EIPProducingSize", "451", Fault::kOutOfRange},
+                             {"PcicTcpSchemaAutoUpdate", "true", 0},
                              {"TemperatureIllu", "20", Fault::kReadOnly},
                              {"DeviceType", "1:3", Fault::kReadOnly},
                              {"OperatingMode", "0", Fault::kReadOnly},
@@ -60,12 +63,13 @@ TEST_F(O3d303Configuration, DeviceParametersAreOfTheirTypeAndRange) {
   for (const Case& one : kCases)
     EXPECT_EQ(faultOf("edit/device/", "setParameter", {one.name, one.value}), one.fault)
         << one.name << " = " << one.value;
-  EXPECT_EQ(all("/").at("Name"), "test") << "not saved yet";
+  EXPECT_EQ(all("/").at("Name"), "ifm3d unit test") << "as it is set in edit mode, saved or not";
+  EXPECT_EQ(device_.parameters().at("Name"), "test") << "not saved yet";
   call("edit/device/", "save");
   end();
   EXPECT_EQ(all("/").at("Name"), "ifm3d unit test");
   EXPECT_EQ(all("/").at("IODebouncing"), "false");
-  EXPECT_EQ(device_.translation_mm()[0], 12.5F);
+  EXPECT_EQ(device_.extrinsics(), (toftwin::o3d303::ExtrinsicCalibration{12.5F, 0, 0, 5, 0, 0}));
 }
 
 TEST_F(O3d303Configuration, APasswordHoldsFromItsSavingOn) {
@@ -174,6 +178,7 @@ TEST_F(O3d303Configuration, ASaveThatIsRefusedSavesNothing) {
   call("edit/device/", "setParameter", {"Name", "half"});
   call("edit/", "deleteApplication", {2});
   EXPECT_EQ(faultOf("edit/device/", "save"), Fault::kNoSuchApplication);
+  end();
   EXPECT_EQ(all("/").at("Name"), "test");
 }
 
@@ -208,9 +213,9 @@ TEST_F(O3d303Configuration, TheClockCanBeSetAndRunsOnAndNetworkTimeIsKept) {
   for (const auto& [name, value] : std::map<std::string, std::string>{
            {"WaitSyncTries", "1"}, {"NTPServers", "91.189.89.198"}, {"SynchronizationActivated", "true"}})
     call(time, "setParameter", {name, value});
-  EXPECT_FALSE(device_.isSynchronised()) << "not saved yet";
+  EXPECT_EQ(device_.hostShift_ns(), std::nullopt) << "not saved yet";
   call(time, "saveAndActivateConfig");
-  EXPECT_TRUE(device_.isSynchronised());
+  EXPECT_EQ(device_.hostShift_ns(), 0);
   EXPECT_EQ(all(time).at("WaitSyncTries"), "1");
   call(time, "setCurrentTime", {1'600'000'000});
   EXPECT_EQ(all(time).at("CurrentTime"), "1600000000");
@@ -253,7 +258,7 @@ TEST_F(O3d303Configuration, AnApplicationComesBackAsItWasExported) {
 
 TEST_F(O3d303Configuration, ATimeThatIsOfTheNetworkIsThisMachines) {
   facts_.device_s = 1000;
-  facts_.host_s = 1'700'000'000;
+  facts_.host_ns = 1'700'000'000'900'000'000;
   device_.update(facts_);
   EXPECT_EQ(all("/").at("ImageTimestampReference"), "1000");
   edit();
@@ -261,6 +266,20 @@ TEST_F(O3d303Configuration, ATimeThatIsOfTheNetworkIsThisMachines) {
   call("edit/device/time/", "saveAndActivateConfig");
   EXPECT_EQ(all("edit/device/time/").at("CurrentTime"), "1700000000");
   EXPECT_EQ(all("/").at("ImageTimestampReference"), "1700000000");
+}
+
+/// The source's clock may go on with its frames alone, as a triggered one's does.
+TEST_F(O3d303Configuration, ATimeThatWasSetGoesOnWithThisMachinesClock) {
+  facts_.device_s = 1000;
+  facts_.host_ns = 1'700'000'000'000'000'000;
+  device_.update(facts_);
+  edit();
+  call("edit/device/time/", "setCurrentTime", {1'600'000'000});
+  EXPECT_EQ(all("edit/device/time/").at("CurrentTime"), "1600000000");
+  *facts_.host_ns += 2'500'000'000;
+  device_.update(facts_);
+  EXPECT_EQ(all("edit/device/time/").at("CurrentTime"), "1600000002");
+  EXPECT_EQ(device_.hostShift_ns(), -100'000'000'000'000'000);
 }
 
 TEST_F(O3d303Configuration, AnApplicationThatCannotBeSavedIsNotImported) {

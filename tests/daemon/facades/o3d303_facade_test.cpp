@@ -85,9 +85,10 @@ TEST_F(O3d303Facade, WhatTheSourceRefusesAtTheEndIsRefusedToo) {
   startO3d303(kSmallSim);
   auto rpc = camera();
   rpc.edit();
-  // 4 exposures of 10 ms with 1 ms after each do not fit into 40 ms, which only the source knows.
-  EXPECT_EQ(rpc.fault(rpc.imager(), "setParameter", {"ExposureTime", "10000"}), 0);
-  EXPECT_EQ(rpc.fault(rpc.imager(), "setParameter", {"FrameRate", "25"}), 0);
+  // 36 exposures with 1 ms after each do not fit into 33 ms, which only the source knows.
+  EXPECT_EQ(rpc.fault(rpc.imager(), "setParameter", {"ExposureTime", "100"}), 0);
+  EXPECT_EQ(rpc.fault(rpc.imager(), "changeType", {"morethan30m_high"}), 0);
+  EXPECT_EQ(rpc.fault(rpc.imager(), "setParameter", {"FrameRate", "30"}), 0);
   EXPECT_EQ(rpc.fault(rpc.session("edit/application/"), "setParameter", {"Name", "another"}), 0);
   EXPECT_EQ(rpc.fault(rpc.session("edit/application/"), "save", {}), 101'002);
   rpc.endSession();
@@ -122,7 +123,7 @@ TEST_F(O3d303Facade, FilesThatAreNotThereAreNotFound) {
   RawHttp http{xmlrpc_};
   const std::string body = encodeXmlRpc(o3d303::XmlRpcCall{"upload", {}});
   http.send(
-      fmt::format("POST /upload HTTP/1.1\r\nHost: x\r\nConnection: close\r\nContent-Length: {}\r\n\r\n{}",
+      fmt::format("POST /upload HTTP/1.1\r\nHost: localhost\r\nContent-Type: text/xml\r\nConnection: close\r\nContent-Length: {}\r\n\r\n{}",
                   body.size(), body));
   EXPECT_THAT(http.receiveAll(), HasSubstr("100000"));
 }
@@ -177,13 +178,12 @@ TEST_F(O3d303Facade, TheModelOfAFrameIsJson) {
 // the ticket and the line end among them.
 TEST_F(O3d303Facade, AFrameIsAsLongAsTheRealCameras) {
   startO3d303(kSmallSim);
-  using Type = o3d303::SchemaElement::Type;
-  o3d303::Schema schema{{Type::Text, "start_string", "star"}};
+  o3d303::Schema schema{o3d303::SchemaElement::text("start_string", "star")};
   for (const auto blob : {o3d303::kAmplitudeBlob, o3d303::kXBlob, o3d303::kYBlob, o3d303::kZBlob,
                           o3d303::kConfidenceBlob, o3d303::kExtrinsicsBlob}) {
-    schema.push_back({Type::Blob, std::string{blob}, {}});
+    schema.push_back(o3d303::SchemaElement::blob(blob));
   }
-  schema.push_back({Type::Text, "end_string", "stop"});
+  schema.push_back(o3d303::SchemaElement::text("end_string", "stop"));
   PcicClient one{camera().pcicPort()};
   EXPECT_EQ(one.command(o3d303::schemaCommand(toJson(schema))), "*");
   one.forgetFrames();
@@ -378,7 +378,7 @@ TEST_F(O3d303Facade, AnotherSourceOfThatNameAfterAReloadIsShown) {
   configure(
       fmt::format("[[source]]\nname = 'cam'\ndriver = 'pattern'\nwidth = 32\nheight = 16\n"
                   "[[facade]]\nkind = 'o3d303'\nsource = 'cam'\nxmlrpc_port = {}\npcic_port = 0\n"
-                  "discoverable = false\n",
+                  "discoverable = false\ntiming = 'fast'\n",
                   xmlrpc_));
   daemon_->reload();
   EXPECT_TRUE(eventually([&] { return watches.frame().chunks.at(0).header.width == 32u; }));

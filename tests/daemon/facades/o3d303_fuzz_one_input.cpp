@@ -9,6 +9,7 @@
 #include "daemon/facades/o3d303/commands.h"
 #include "daemon/facades/o3d303/device.h"
 #include "daemon/facades/o3d303/discovery.h"
+#include "daemon/facades/o3d303/request_check.h"
 #include "drivers/o3d303/wire/base64.h"
 #include "drivers/o3d303/wire/frame_writer.h"
 #include "drivers/o3d303/wire/pcic.h"
@@ -37,7 +38,7 @@ constexpr std::array<std::string_view, 10> kObjects{"",
                                                     "edit/application/imager_001/",
                                                     "edit/application/imager_001/spatialfilter",
                                                     "edit/application/imager_001/temporalfilter"};
-constexpr std::array<std::string_view, 34> kMethods{"requestSession",
+constexpr std::array<std::string_view, 36> kMethods{"requestSession",
                                                     "setOperatingMode",
                                                     "editApplication",
                                                     "setParameter",
@@ -70,7 +71,9 @@ constexpr std::array<std::string_view, 34> kMethods{"requestSession",
                                                     "importApplication",
                                                     "exportConfig",
                                                     "importConfig",
-                                                    "getAllParameterLimits"};
+                                                    "getAllParameterLimits",
+                                                    "changeNameAndDescription",
+                                                    "select"};
 
 SourceFacts facts() {
   SourceFacts facts = operableFacts({0.1, 30.0});
@@ -141,6 +144,11 @@ void playCalls(std::string_view text) {
       demand(!device.isEditing());
       continue;
     }
+    if (call.method == "select") {
+      const auto selected = device.select(static_cast<int>(object));
+      if (selected) checkChanges(selected->changes);
+      continue;
+    }
     const std::string path = "/api/rpc/v1/com.ifm.efector/" +
                              (object == 0 ? std::string{} : std::string{kSession}) +
                              std::string{kObjects[object]};
@@ -149,7 +157,10 @@ void playCalls(std::string_view text) {
     static_cast<void>(encodeXmlRpc(outcome.answer));
     if (outcome.has_saved) demand(isServed(device.defaultSchema()));
     if (!outcome.changes.empty()) device.update(facts());
-    for (const float t : device.translation_mm()) demand(std::isfinite(t));
+    for (const float one : device.extrinsics()) demand(std::isfinite(one));
+    const auto control = device.exposureControl();
+    demand(!control || control->bounds.least_us >= 1.0);
+    static_cast<void>(device.binning());
   }
 }
 
@@ -162,6 +173,8 @@ void readMessages(std::span<const std::byte> bytes) {
     const Command command = readCommand(toftwin::o3d303::textOf((*message)->content));
     if (command.kind == Command::Kind::SetSchema) demand(isServed(command.schema));
     if (command.kind == Command::Kind::SetOutput) demand(command.output < 16);
+    demand(command.number >= 0 && command.number < 100);
+    demand(isServed(withoutMarkers(command.schema)) || !isServed(command.schema));
   }
 }
 
@@ -172,6 +185,11 @@ void fuzzOneInput(std::span<const std::byte> bytes) {
   readMessages(bytes);
   static_cast<void>(readCommand(text));
   static_cast<void>(readSearch(bytes));
+  static_cast<void>(readExposureRegion(std::string{text}));
+  const std::size_t cut = text.size() / 3;
+  const auto refused =
+      refusalOf({text.substr(0, cut), text.substr(cut, cut), text.substr(2 * cut)}, {"camera.lan"});
+  demand((refused.status == 0) == refused.why.empty());
   playCalls(text);
   if (const auto call = toftwin::o3d303::readXmlRpcCall(text)) {
     Device device = freshDevice();

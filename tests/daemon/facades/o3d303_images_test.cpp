@@ -130,10 +130,10 @@ TEST_F(O3d303Images, LensAndPlaceAreThoseOfTheSource) {
     worst_px = std::max(worst_px, lens.fx * std::abs(undistorted - ray.x / ray.z));
     if (distance_mm[i] <= 0.0F) continue;
     ++with_value;
-    // p = e d + t; the camera's X is p's z, Y its -x and Z its -y. A count is a millimetre.
-    ASSERT_NEAR(x_mm[i], distance_mm[i] * ray.z + 300.0, 0.501) << i;
-    ASSERT_NEAR(y_mm[i], -distance_mm[i] * ray.x - 12.5, 0.501) << i;
-    ASSERT_NEAR(z_mm[i], -distance_mm[i] * ray.y + 40.0, 0.501) << i;
+    // p = e d + t, X right, Y down, Z forward. A count is a millimetre.
+    ASSERT_NEAR(x_mm[i], distance_mm[i] * ray.x + 12.5, 0.501) << i;
+    ASSERT_NEAR(y_mm[i], distance_mm[i] * ray.y - 40.0, 0.501) << i;
+    ASSERT_NEAR(z_mm[i], distance_mm[i] * ray.z + 300.0, 0.501) << i;
   }
   EXPECT_GT(with_value, 176 * 132 / 2);
   // Five terms do not undo five: a fit over all pixels, made elsewhere, leaves 1.08 pixels in a corner; this
@@ -222,20 +222,20 @@ TEST_F(O3d303Images, WhatIsClippedIsInvalidInItsImagesAndSaysWhy) {
   auto rpc = camera();
   rpc.edit();
   rpc.call(rpc.imager(), "setParameter", {"ClippingLeft", "88"});
-  rpc.call(rpc.imager(), "setParameter", {"ClippingCuboid", R"({"ZMax": 0})"});
+  rpc.call(rpc.imager(), "setParameter", {"ClippingCuboid", R"({"YMin": 0})"});
   rpc.call(rpc.session("edit/application/"), "save", {});
   rpc.endSession();
   PcicClient watches{rpc.pcicPort()};
-  EXPECT_EQ(watches.setSchema({o3d303::kDistanceBlob, o3d303::kConfidenceBlob, o3d303::kZBlob}), "*");
+  EXPECT_EQ(watches.setSchema({o3d303::kDistanceBlob, o3d303::kConfidenceBlob, o3d303::kYBlob}), "*");
   const auto frame = watches.frame();
   const auto distance = frame.find(o3d303::ChunkType::RadialDistance)->data;
   const auto confidence = frame.find(o3d303::ChunkType::Confidence)->data;
-  const auto z = frame.find(o3d303::ChunkType::Z)->data;
+  const auto y_mm = *o3d303::numbersOf(*frame.find(o3d303::ChunkType::Y));
   int clipped = 0, left = 0;
   for (std::size_t i = 0; i < confidence.size(); ++i) {
     const bool is_clipped = (std::to_integer<unsigned>(confidence[i]) & 0x40U) != 0;
     const bool has_distance = distance[2 * i] != std::byte{0} || distance[2 * i + 1] != std::byte{0};
-    const bool is_above = z[2 * i + 1] == std::byte{0} && z[2 * i] != std::byte{0};  // up to 255 mm, or more:
+    const bool is_above = y_mm[i] < 0.0F;
     EXPECT_FALSE(is_clipped && has_distance);
     EXPECT_TRUE(is_clipped || i % 176 >= 88);
     EXPECT_FALSE(has_distance && is_above);
