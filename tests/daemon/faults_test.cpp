@@ -5,13 +5,17 @@
 
 #include <algorithm>
 #include <cmath>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
 #include <thread>
 
+#include <unistd.h>
+
 #include <fmt/format.h>
 
 #include "daemon/faults.h"
+#include "drivers/pace.h"
 #include "drivers/pattern/pattern.h"
 #include "running_daemon.h"
 
@@ -296,6 +300,60 @@ std::size_t changed(const Frame& frame, std::uint64_t shift) {
 
 // Binomial: 3072 pixels at 0.1 are 307.2 ± 16.6; 5 sigma are exceeded once in 1.7 million runs, and the seed
 // is fixed.
+/// A camera in real time on a machine that has no time for some of its turns.
+class Hurried final : public drivers::Source {
+ public:
+  /// `made`: the turns, counted from 0, for which there is time.
+  explicit Hurried(std::vector<std::int64_t> made) : made_(std::move(made)) { info_.frame_interval = 10_ms; }
+  [[nodiscard]] const drivers::SourceInfo& info() const override { return info_; }
+  Result<> start() override { return {}; }
+  void stop() override {}
+  Result<Frame> next(std::stop_token, bool) override {
+    if (next_ == made_.size()) return Error{Error::Code::EndOfStream, "no more"};
+    Frame frame;
+    frame.moment.exposures.push_back({{made_[next_] * kInterval_ns}, 1_ms, 30_MHz});
+    const std::int64_t before = next_ == 0 ? -1 : made_[next_ - 1];
+    frame.dropped_by_device = static_cast<std::uint64_t>(made_[next_++] - before - 1);
+    if (frame.dropped_by_device > 0) frame.dropped_because = drivers::kNotInTime;
+    return frame;
+  }
+
+ private:
+  drivers::SourceInfo info_;
+  std::vector<std::int64_t> made_;
+  std::size_t next_ = 0;
+};
+
+/// The log of a plan over two openings of cameras that make those turns.
+std::string logOver(const std::vector<std::int64_t>& first, const std::vector<std::int64_t>& second) {
+  const std::string log = testing::TempDir() + fmt::format("toftwin_faults_{}.csv", ::getpid());
+  FaultKeys away = fault(FaultKind::Disconnect, 6);
+  away.outage = 0_s;
+  {
+    const auto plan = std::make_shared<FaultPlan>(
+        std::vector{fault(FaultKind::Loss, 2, 1, 3), away, fault(FaultKind::ClockStep, 4)}, "cam", log);
+    for (const auto* made : {&first, &second}) {
+      auto source =
+          FaultPlan::open(plan, Result<std::unique_ptr<drivers::Source>>{std::make_unique<Hurried>(*made)});
+      while ((*source)->next({}, false)) {
+      }
+    }
+  }
+  std::ifstream file{log};
+  std::string lines{std::istreambuf_iterator<char>{file}, {}};
+  std::filesystem::remove(log);
+  return lines;
+}
+
+TEST(Faults, TheLogIsTheSameOnAMachineThatHasNoTimeForSomeFrames) {
+  const std::string in_time = logOver({0, 1, 2, 3, 4, 5, 6, 7}, {0, 1, 2, 3, 4, 5});
+  EXPECT_THAT(in_time, HasSubstr("6,1060000000,1,disconnect,0 s\n8,1010000000,0,loss,not given\n"));
+  EXPECT_EQ(logOver({0, 1, 4, 5, 6}, {0, 1, 2, 3, 4, 5}), in_time)
+      << "a loss and the clock's step among them";
+  EXPECT_EQ(logOver({0, 1, 2, 3, 4, 5, 7}, {0, 1, 2, 3, 4, 5}), in_time) << "the device went meanwhile";
+  EXPECT_EQ(logOver({0, 1, 2, 3, 4, 5, 6}, {2, 3, 5}), in_time) << "after it came back";
+}
+
 TEST(Faults, CorruptedPixelsAreAsManyAsAskedForAndOthersInEachFrame) {
   auto corrupt = fault(FaultKind::Corruption, 0, 2);
   corrupt.share = 0.1;
