@@ -15,6 +15,7 @@ enum class Reliability { BestEffort, Reliable };
 enum class StampClock { Host, Device };
 enum class TransformKind { Static, Moving, None };
 enum class PoseType { PoseStamped, TransformMessage };
+enum class NodeInfo { Iron, Humble, None };
 
 /// The keys of a [[facade]] table with kind = "ros2".
 struct Keys {
@@ -30,6 +31,8 @@ struct Keys {
   std::string pose_topic;
   PoseType pose_type = PoseType::PoseStamped;
   bool trigger_on_pose = false;
+  NodeInfo node_info = NodeInfo::Iron;
+  bool diagnostics = true;
   std::vector<std::string> peers;
   FrameLineKeys line;
 
@@ -66,6 +69,12 @@ struct Keys {
              "the transform from frame_id to parent_frame is taken");
     v.flag("trigger_on_pose", trigger_on_pose,
            "whether each pose also asks for a frame: in lockstep with a source that waits for triggers");
+    v.choice("node_info", node_info,
+             {{"iron", NodeInfo::Iron}, {"humble", NodeInfo::Humble}, {"none", NodeInfo::None}},
+             "for programs of which ROS 2 the camera is a node, in ros2 node list and rqt_graph: Iron and "
+             "newer, such "
+             "as Jazzy; Humble and older; of none");
+    v.flag("diagnostics", diagnostics, "whether /diagnostics tells every second how the source is");
     v.texts("peers", peers,
             "IP addresses of machines whose programs are looked for, where multicast does not reach them");
     v.group("line", line, "what goes wrong on purpose with a frame's messages");

@@ -124,9 +124,23 @@ Participant::~Participant() {
   if (domain_ > 0) dds_delete(domain_);
 }
 
+Participant::Guid Participant::guidOf(dds_entity_t entity) {
+  dds_guid_t guid{};
+  Guid bytes{};
+  if (dds_get_guid(entity, &guid) == DDS_RETCODE_OK) std::ranges::copy(guid.v, bytes.begin());
+  return bytes;
+}
+
+std::vector<Participant::Guid> Participant::guidsOf(const std::vector<dds_entity_t>& entities) {
+  std::vector<Guid> guids;
+  for (const dds_entity_t entity : entities) guids.push_back(guidOf(entity));
+  return guids;
+}
+
 Result<dds_entity_t> Participant::topic(const std::string& name, const dds_topic_descriptor_t& type) const {
-  // ROS 2 puts "rt" before the names of topics.
-  const dds_entity_t topic = dds_create_topic(participant_, &type, ("rt" + name).c_str(), nullptr, nullptr);
+  // ROS 2 puts "rt" before the names of topics, but of its own.
+  const std::string full = name.starts_with('/') ? "rt" + name : name;
+  const dds_entity_t topic = dds_create_topic(participant_, &type, full.c_str(), nullptr, nullptr);
   if (topic < 0) return errorOf(fmt::format("the topic {}", name), topic);
   return topic;
 }
@@ -137,6 +151,7 @@ Result<Writer> Participant::write(const std::string& name, const dds_topic_descr
   if (!of) return of.error();
   const dds_entity_t writer = dds_create_writer(participant_, *of, qosOf(quality).get(), nullptr);
   if (writer < 0) return errorOf(fmt::format("a writer of {}", name), writer);
+  writers_.push_back(writer);
   return Writer{writer};
 }
 
@@ -154,6 +169,7 @@ Result<dds_entity_t> Participant::read(const std::string& name, const dds_topic_
   dds_qset_ignorelocal(qos.get(), DDS_IGNORELOCAL_PARTICIPANT);
   const dds_entity_t reader = dds_create_reader(participant_, *of, qos.get(), listener.get());
   if (reader < 0) return errorOf(fmt::format("a reader of {}", name), reader);
+  readers_.push_back(reader);
   return reader;
 }
 

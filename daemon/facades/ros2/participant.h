@@ -4,6 +4,8 @@
 #include <dds/dds.h>
 #include <toftwin/result.h>
 
+#include <array>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <string>
@@ -49,17 +51,26 @@ class Participant {
   Participant(const Participant&) = delete;
   Participant& operator=(const Participant&) = delete;
 
-  /// `topic` as in ROS 2: "/camera/points".
+  /// `topic` as in ROS 2: "/camera/points"; or without "/" one of ROS 2's own, as DDS has it.
   Result<Writer> write(const std::string& topic, const dds_topic_descriptor_t& type, const Quality& quality);
   /// `wake` is called on a thread of DDS when there is something to take.
   Result<dds_entity_t> read(const std::string& topic, const dds_topic_descriptor_t& type,
                             const Quality& quality, std::function<void()> wake);
 
+  /// What the network knows it by, and the writers and readers that it has so far.
+  using Guid = std::array<std::uint8_t, 16>;
+  [[nodiscard]] Guid guid() const { return guidOf(participant_); }
+  [[nodiscard]] std::vector<Guid> writers() const { return guidsOf(writers_); }
+  [[nodiscard]] std::vector<Guid> readers() const { return guidsOf(readers_); }
+
  private:
   Participant() = default;
+  static Guid guidOf(dds_entity_t entity);
+  static std::vector<Guid> guidsOf(const std::vector<dds_entity_t>& entities);
   Result<dds_entity_t> topic(const std::string& name, const dds_topic_descriptor_t& type) const;
 
   dds_entity_t domain_ = 0, participant_ = 0;
+  std::vector<dds_entity_t> writers_, readers_;
   std::vector<std::unique_ptr<std::function<void()>>> wakes_;  ///< DDS has their addresses
 };
 

@@ -12,7 +12,9 @@
 #include <utility>
 
 #include "daemon/facades/event_thread.h"
+#include "daemon/facades/ros2/diagnostics.h"
 #include "daemon/facades/ros2/keys.h"
+#include "daemon/facades/ros2/node.h"
 #include "daemon/facades/ros2/participant.h"
 #include "daemon/facades/ros2/pose.h"
 #include "daemon/facades/ros2/topics.h"
@@ -24,6 +26,7 @@ namespace toftwin::daemon::ros2 {
 namespace {
 
 constexpr std::chrono::milliseconds kTick{100};
+constexpr std::uint64_t kTicksPerDiagnosis = 10;
 
 class Ros2Facade final : public Facade {
  public:
@@ -58,6 +61,12 @@ class Ros2Facade final : public Facade {
       if (!reader) return reader.error();
       pose_reader_ = *reader;
     }
+    if (keys_.diagnostics) {
+      auto diagnostics = Diagnostics::open(*participant_);
+      if (!diagnostics) return diagnostics.error();
+      diagnostics_ = *std::move(diagnostics);
+    }
+    if (auto announced = announceNode(keys_, *participant_); !announced) return announced.error();
     where_ = fmt::format(
         "ROS 2 topics /{0}/depth/image_raw, /{0}/amplitude/image_raw, /{0}/points on {1}, domain {2}",
         keys_.name, place_.keys.address, keys_.domain);
@@ -72,6 +81,7 @@ class Ros2Facade final : public Facade {
   /// put.
   void tick() {
     const auto description = link_.describe();
+    if (diagnostics_ && ticks_++ % kTicksPerDiagnosis == 0) diagnose(description);
     *clients_ = topics_->readers();
     const bool is_wanted = !has_seen_frame_ || *clients_ > 0;
     link_.want(is_wanted);
@@ -79,6 +89,21 @@ class Ros2Facade final : public Facade {
     if (!description) return;
     if (!has_seen_frame_ && !put_at_frame_) put_at_frame_ = description->world_from_camera;
     if (!is_wanted || waits) tellPose(description->world_from_camera);
+  }
+
+  void diagnose(const Result<wire::SourceDescription>& description) {
+    const wire::SourceHealth health = link_.health();
+    const SourceNow now{.is_present = description && description->summary.problem.empty(),
+                        .problem = description ? description->summary.problem : description.error().message,
+                        .is_streaming = health.streaming,
+                        .frames = health.frames,
+                        .lost = health.dropped_by_device,
+                        .reconnects = health.reconnects};
+    const Diagnosis diagnosis = diagnosisOf(now, std::exchange(lost_told_, now.lost));
+    if (auto told = diagnostics_->tell(keys_.name + ": " + place_.keys.source, place_.keys.source, diagnosis,
+                                       place_.clock.wall());
+        !told)
+      complainOnce(told.error().message);
   }
 
   /// Frames tell it themselves, each of its own time; without any, what was set is where the camera is. One
@@ -158,6 +183,8 @@ class Ros2Facade final : public Facade {
   Repeating tick_;
   std::unique_ptr<Participant> participant_;
   std::optional<Topics> topics_;
+  std::optional<Diagnostics> diagnostics_;
+  std::uint64_t ticks_ = 0, lost_told_ = 0;
   dds_entity_t pose_reader_ = 0;
   bool has_seen_frame_ = false, is_setting_ = false;
   std::uint64_t newest_ = 0;  ///< frame that was taken

@@ -96,6 +96,87 @@ TEST_F(Ros2Facade, WithoutAnyKeysItIsReadByReadersThatAskForNothingSpecial) {
   EXPECT_TRUE(nextOf(program_->read("/cam/points", kPoints, Asks::Reliable)));
 }
 
+/// rmw_dds_common/ParticipantEntitiesInfo, as published.
+struct NodeSaid {
+  std::string space, name;
+  std::vector<std::vector<std::uint8_t>> readers, writers;
+};
+NodeSaid readNode(Cdr message, std::size_t gid_size) {
+  CdrReader cdr{std::move(message)};
+  const auto gid = [&] {
+    auto bytes = cdr.numbers<std::uint8_t>(gid_size);
+    for (std::size_t i = 16; i < gid_size; ++i) EXPECT_EQ(bytes[i], 0);
+    bytes.resize(16);
+    return bytes;
+  };
+  const auto gids = [&] {
+    std::vector<std::vector<std::uint8_t>> all(cdr.number<std::uint32_t>());
+    for (auto& one : all) one = gid();
+    return all;
+  };
+  gid();
+  EXPECT_EQ(cdr.number<std::uint32_t>(), 1U) << "one node";
+  NodeSaid said;
+  said.space = cdr.text();
+  said.name = cdr.text();
+  said.readers = gids();
+  said.writers = gids();
+  EXPECT_LT(cdr.left(), 4U);
+  return said;
+}
+
+constexpr const char* kNodeInfo = "rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_";
+
+TEST_F(Ros2Facade, IsANodeWithItsWritersAndReaders) {
+  startRos2(kPattern, "name = 'front/tof'\npose_topic = '/pose'");
+  auto message = nextOf(program_->read("ros_discovery_info", kNodeInfo, Asks::Latched));
+  ASSERT_TRUE(message);
+  const NodeSaid said = readNode(*std::move(message), 16);
+  EXPECT_EQ(said.space, "/front");
+  EXPECT_EQ(said.name, "tof");
+  EXPECT_EQ(said.readers.size(), 1u) << "of the pose";
+  EXPECT_EQ(said.writers.size(), 7u) << "five of frames, transforms, diagnostics";
+  std::vector<std::uint8_t> writer;
+  ASSERT_TRUE(nextOf(program_->read("/front/tof/points", kPoints), &writer));
+  EXPECT_THAT(said.writers, testing::Contains(writer)) << "as the network sees it";
+}
+
+TEST_F(Ros2Facade, ForHumbleIdentifiersHave24Bytes) {
+  startRos2(kPattern, "node_info = 'humble'");
+  auto message = nextOf(program_->read("ros_discovery_info", kNodeInfo, Asks::Latched));
+  ASSERT_TRUE(message);
+  const NodeSaid said = readNode(*std::move(message), 24);
+  EXPECT_EQ(said.space, "/");
+  EXPECT_EQ(said.name, "cam");
+  EXPECT_EQ(said.writers.size(), 7u);
+}
+
+TEST_F(Ros2Facade, DiagnosticsTellHowTheSourceIs) {
+  startRos2(kPattern);
+  auto message =
+      nextOf(program_->read("/diagnostics", "diagnostic_msgs::msg::dds_::DiagnosticArray_", Asks::Reliable));
+  ASSERT_TRUE(message);
+  CdrReader cdr{*std::move(message)};
+  readHeader(cdr, "");
+  ASSERT_EQ(cdr.number<std::uint32_t>(), 1U);
+  EXPECT_LE(cdr.number<std::uint8_t>(), 1) << "OK, or frames were lost on a busy machine";
+  EXPECT_EQ(cdr.text(), "cam: cam");
+  EXPECT_FALSE(cdr.text().empty());
+  EXPECT_EQ(cdr.text(), "cam") << "the hardware";
+  ASSERT_EQ(cdr.number<std::uint32_t>(), 3U);
+  EXPECT_EQ(cdr.text(), "frames");
+}
+
+/// rviz2 and subscriptions ask for reliable ones, nav2's layers for sensor data: all get them.
+TEST_F(Ros2Facade, PointsAndImagesAreReadByReliableAndBestEffortReaders) {
+  startRos2(kPattern);
+  for (const Asks asks : {Asks::Reliable, Asks::SensorData}) {
+    EXPECT_TRUE(nextOf(program_->read("/cam/points", kPoints, asks)));
+    EXPECT_TRUE(nextOf(program_->read("/cam/depth/image_raw", kImage, asks)));
+    EXPECT_TRUE(nextOf(program_->read("/cam/amplitude/camera_info", kInfo, asks)));
+  }
+}
+
 TEST_F(Ros2Facade, HealthCountsTheReadersOfItsFrames) {
   startRos2(kPattern);
   EXPECT_EQ(facadeClients(), 0u);

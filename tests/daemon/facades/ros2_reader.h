@@ -188,20 +188,24 @@ class RosProgram {
     support->auto_fill_type_information(false);
     support->auto_fill_type_object(false);
     support.register_type(participant_);
-    if (auto* known = participant_->lookup_topicdescription("rt" + name))
-      return dynamic_cast<dds::Topic*>(known);
-    return participant_->create_topic("rt" + name, type, dds::TOPIC_QOS_DEFAULT);
+    const std::string full = name.starts_with('/') ? "rt" + name : name;  // or one of ROS 2's own
+    if (auto* known = participant_->lookup_topicdescription(full)) return dynamic_cast<dds::Topic*>(known);
+    return participant_->create_topic(full, type, dds::TOPIC_QOS_DEFAULT);
   }
   dds::DomainParticipant* participant_;
 };
 
-/// The next message, or nothing after half a minute.
-inline std::optional<Cdr> nextOf(dds::DataReader* reader) {
+/// The next message, or nothing after half a minute. Puts the identifier of its writer in, where it is asked for.
+inline std::optional<Cdr> nextOf(dds::DataReader* reader, std::vector<std::uint8_t>* writer = nullptr) {
   const auto deadline = std::chrono::steady_clock::now() + std::chrono::seconds{30};
   while (std::chrono::steady_clock::now() < deadline) {
     Cdr message;
     dds::SampleInfo info;
     if (reader->take_next_sample(&message, &info) == eprosima::fastrtps::types::ReturnCode_t::RETCODE_OK) {
+      if (writer != nullptr) {
+        writer->clear();
+        for (std::size_t i = 0; i < 16; ++i) writer->push_back(info.publication_handle.value[i]);
+      }
       if (info.valid_data) return message;
       continue;
     }
