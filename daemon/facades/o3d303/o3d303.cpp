@@ -24,6 +24,7 @@
 #include "daemon/facades/o3d303/images.h"
 #include "daemon/facades/o3d303/keys.h"
 #include "daemon/facades/o3d303/pcic_server.h"
+#include "daemon/facades/o3d303/source_changes.h"
 #include "daemon/facades/source_link.h"
 #include "drivers/logging.h"
 #include "protocol/settings/describe.h"
@@ -44,44 +45,6 @@ constexpr double kCooled_k = 2.0;  ///< below the limit, until it may be too hot
 std::string textOf(const std::array<std::uint8_t, 6>& mac) {
   return fmt::format("{:02X}:{:02X}:{:02X}:{:02X}:{:02X}:{:02X}", mac[0], mac[1], mac[2], mac[3], mac[4],
                      mac[5]);
-}
-
-XmlRpcFault faultOf(const Error& error) {
-  using Code = Error::Code;
-  const int code = error.code == Code::InvalidArgument                               ? Fault::kOutOfRange
-                   : error.code == Code::NotFound || error.code == Code::Unsupported ? Fault::kReadOnly
-                                                                                     : Fault::kInternal;
-  return {code, error.message};
-}
-
-/// One may be possible only after another, as a longer exposure after a slower frame rate; so what is refused
-/// is tried again as long as something else could be done. If something stays refused, all is as before.
-Result<> setAll(drivers::Source& source, SourceChanges changes) {
-  const auto before = source.state().parameters;
-  SourceChanges done;
-  while (!changes.empty()) {
-    SourceChanges refused;
-    Result<> first_refusal;
-    for (auto& [name, value] : changes) {
-      auto set = source.setParameter(name, value);
-      if (set) {
-        done.emplace_back(name, value);
-        continue;
-      }
-      if (first_refusal) first_refusal = set;
-      refused.emplace_back(name, value);
-    }
-    if (refused.size() == changes.size()) {
-      std::ranges::reverse(done);
-      for (const auto& [name, value] : done) {
-        const auto was = std::ranges::find(before, name, &Parameter::name);
-        if (was != before.end() && was->value) static_cast<void>(source.setParameter(name, *was->value));
-      }
-      return first_refusal;
-    }
-    changes = std::move(refused);
-  }
-  return {};
 }
 
 class O3d303Facade final : public Facade {

@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a client's commands do.
+#include "daemon/facades/o3d303/pcic_connection.h"
+
+#include <utility>
+
+namespace toftwin::daemon::o3d303 {
+namespace {
+
+using boost::system::error_code;
+using toftwin::o3d303::Bytes;
+using toftwin::o3d303::Schema;
+
+constexpr int kVersion = 3;                         ///< of the protocol, the only one that is spoken
+constexpr std::chrono::seconds kFramePatience{10};  ///< with a frame that was triggered
+
+}  // namespace
+
+void PcicServer::Connection::obey(const toftwin::o3d303::PcicMessage& message) {
+  const Command command = readCommand(toftwin::o3d303::textOf(message.content));
+  switch (command.kind) {
+    case Command::Kind::SetSchema:
+      schema_ = command.schema;
+      schema_text_ = command.schema_text;
+      return reply(message.ticket, toftwin::o3d303::kDone);
+    case Command::Kind::SetOutput:
+      output_ = command.output;
+      return reply(message.ticket, toftwin::o3d303::kDone);
+    case Command::Kind::AskSchema: {
+      const std::string json = schema_ ? schema_text_ : server_.hooks_.default_schema_text();
+      return reply(message.ticket, fmt::format("{:09}{}", json.size(), json));
+    }
+    case Command::Kind::Trigger:
+      return trigger(message.ticket);
+    case Command::Kind::TriggerAndWait:
+      return triggerAndWait(message.ticket);
+    case Command::Kind::AskError:
+      return reply(message.ticket, fmt::format("{:09}", server_.last_error_));
+    case Command::Kind::AskImage:
+      return replyImage(message.ticket, command.number);
+    case Command::Kind::AskConnection:
+      return reply(message.ticket, fmt::format("{:03}", number_));
+    case Command::Kind::AskCommands:
+      return reply(message.ticket, listOfCommands());
+    case Command::Kind::Activate:
+      return activate(message.ticket, command.number);
+    case Command::Kind::SetVersion:
+      return reply(message.ticket,
+                   command.number == kVersion ? toftwin::o3d303::kDone : toftwin::o3d303::kRefused);
+    case Command::Kind::SetWire:
+    case Command::Kind::AskWire:
+      return wire(message.ticket, command);
+    case Command::Kind::Refused:
+      return reply(message.ticket, toftwin::o3d303::kRefused);
+    case Command::Kind::Other:
+      break;
+  }
+  const std::string answer = server_.hooks_.ask(toftwin::o3d303::textOf(message.content));
+  answer.empty() ? reply(message.ticket, toftwin::o3d303::kUnknown) : reply(message.ticket, answer);
+}
+
+void PcicServer::Connection::trigger(const std::string& ticket) {
+  server_.hooks_.trigger([self = shared_from_this(), ticket](int error) {
+    self->reply(ticket, error == 0 ? toftwin::o3d303::kDone : toftwin::o3d303::kRefused);
+    if (error != 0 && *self->alive_) self->server_.tellError(error);
+  });
+}
+
+void PcicServer::Connection::triggerAndWait(const std::string& ticket) {
+  if (waiting_ticket_) return reply(ticket, toftwin::o3d303::kRefused);
+  waiting_ticket_ = ticket;
+  waits_.expires_after(kFramePatience);
+  waits_.async_wait([weak = weak_from_this()](error_code cancelled) {
+    const auto self = weak.lock();
+    if (!cancelled && self) self->stopWaiting();
+  });
+  server_.hooks_.trigger([self = shared_from_this()](int error) {
+    if (error == 0) return;
+    self->stopWaiting();
+    if (*self->alive_) self->server_.tellError(error);
+  });
+}
+
+void PcicServer::Connection::stopWaiting() {
+  waits_.cancel();
+  if (waiting_ticket_) reply(*std::exchange(waiting_ticket_, std::nullopt), toftwin::o3d303::kRefused);
+}
+
+void PcicServer::Connection::replyImage(const std::string& ticket, int number) {
+  constexpr int kLastResult = 10;
+  const auto* frame = server_.hooks_.last_frame();
+  const Schema wanted = number == kLastResult ? withoutMarkers(schema()) : schemaOfImage(number);
+  if (frame == nullptr || wanted.empty()) return reply(ticket, toftwin::o3d303::kRefused);
+  const auto content = writeFrameContent(wanted, *frame);
+  if (!content) return reply(ticket, toftwin::o3d303::kRefused);
+  Bytes answer;
+  toftwin::o3d303::appendText(answer, fmt::format("{:09}", content->size()));
+  answer.insert(answer.end(), content->begin(), content->end());
+  replyWith(ticket, answer);
+}
+
+void PcicServer::Connection::activate(const std::string& ticket, int index) {
+  server_.hooks_.activate(index, [self = shared_from_this(), ticket](bool is_done) {
+    self->reply(ticket, is_done ? toftwin::o3d303::kDone : toftwin::o3d303::kRefused);
+  });
+}
+
+void PcicServer::Connection::wire(const std::string& ticket, const Command& command) {
+  if (command.number < 1 || command.number > kWires) return reply(ticket, toftwin::o3d303::kRefused);
+  bool& is_high = server_.wires_[static_cast<std::size_t>(command.number) - 1];
+  if (command.kind == Command::Kind::AskWire)
+    return reply(ticket, fmt::format("{:02}{}", command.number, is_high ? 1 : 0));
+  is_high = command.is_high;
+  reply(ticket, toftwin::o3d303::kDone);
+}
+
+}  // namespace toftwin::daemon::o3d303
