@@ -42,7 +42,8 @@ def receive(line, count):
 class Camera:
     """Triggers frames and takes their point images: PCIC, protocol version 3."""
 
-    IMAGES = {200: "x", 201: "y", 202: "z", 300: "confidence"}
+    # The camera's X is right, its Y down and its Z ahead.
+    IMAGES = {200: "right", 201: "down", 202: "ahead", 300: "confidence"}
 
     def __init__(self, host, port):
         self.line = socket.create_connection((host, port), timeout=30)
@@ -63,14 +64,14 @@ class Camera:
             raise SystemExit("dock: what came is no frame")
         images, at = {}, 4
         while at + 24 <= len(content) and content[at:at + 4] != b"stop":
-            kind, size, header, _, width, height = struct.unpack_from("<6I", content, at)
+            kind, size, header, _, columns, rows = struct.unpack_from("<6I", content, at)
             if kind in self.IMAGES:
-                form = "B" if kind == 300 else "h"
-                images[self.IMAGES[kind]] = struct.unpack_from(f"<{width * height}{form}", content, at + header)
+                form, width = "B" if kind == 300 else "h", columns
+                images[self.IMAGES[kind]] = struct.unpack_from(f"<{columns * rows}{form}", content, at + header)
             at += max(size, 24)
-        every = zip(images["x"], images["y"], images["z"], images["confidence"])
-        return [(x / 1000, y / 1000, z / 1000, min(i % width, width - 1 - i % width))
-                for i, (x, y, z, confidence) in enumerate(every) if not confidence & 1]
+        every = zip(images["ahead"], images["right"], images["down"], images["confidence"])
+        return [(ahead / 1000, -right / 1000, -down / 1000, min(i % width, width - 1 - i % width))
+                for i, (ahead, right, down, confidence) in enumerate(every) if not confidence & 1]
 
 
 class World:
