@@ -4,6 +4,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <chrono>
+#include <cmath>
 #include <limits>
 #include <optional>
 #include <utility>
@@ -11,6 +13,7 @@
 #include "drivers/logging.h"
 #include "drivers/loss_reasons.h"
 #include "drivers/pace.h"
+#include "protocol/record/frame_times.h"
 #include "protocol/record/recording.h"
 #include "protocol/settings/describe.h"
 
@@ -40,6 +43,8 @@ std::optional<std::int64_t> intervalOf_ns(const Frame& first, const Frame& secon
   if (interval_ns <= 0 || interval_ns == kMost_ns) return std::nullopt;
   return interval_ns;
 }
+
+constexpr double kWorthTelling_s = 5.0;  ///< of a clock's jump; less may be a delay on the way
 
 /// The places of a recording that could not be read.
 struct Damage {
@@ -114,17 +119,13 @@ class ReplaySource final : public Source {
       return turn.error();
     }
     Frame frame = *std::exchange(waiting_, std::nullopt);
+    if (paced_) *paced_ += waits_;
     ++played_;
     last_device_ns_ = deviceTime_ns(frame);
     return frame;
   }
 
  private:
-  struct Paced {
-    SteadyTime since;
-    std::int64_t received_ns;  ///< of the frame that was due then
-  };
-
   /// Reads the next frame ahead, unless one waits already.
   Result<> fetch(const std::stop_token& stop) {
     if (waiting_) return {};
@@ -141,12 +142,35 @@ class ReplaySource final : public Source {
                       info_.serial, played_)};
     }
     frame->provenance.kind = FrameKind::Replayed;
+    waits_ = waitBefore(record::FrameTimes::of(*frame));
     if (!first_device_ns_) first_device_ns_ = deviceTime_ns(*frame);
     for (Exposure& exposure : frame->moment.exposures) exposure.start.ns = moved(exposure.start.ns);
     frame->moment.received.ns = moved(frame->moment.received.ns);
     waiting_ = *std::move(frame);
     return {};
   }
+
+  /// How long after the frame before it a frame comes. Jumps of a clock and gaps that are shortened are logged.
+  std::chrono::nanoseconds waitBefore(const record::FrameTimes& now) {
+    const auto before = std::exchange(times_, now);
+    if (!before) return std::chrono::nanoseconds{played_before_ > 0 ? interval_ns_ : 0};
+    const record::FrameStep step = record::stepBetween(*before, now, interval_ns_);
+    const auto seconds = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns); };
+    if (step.jumped != record::Jumped::Neither && std::abs(seconds(step.by_ns)) > kWorthTelling_s && hasLogRoom()) {
+      logging::info("replay of {}: the {}'s clock jumped by {:+.3f} s after {} frames; {:.3f} s are taken to have passed", info_.serial,
+                    step.jumped == record::Jumped::Host ? "host" : "device", seconds(step.by_ns), played_,
+                    seconds(step.elapsed_ns));
+    }
+    const auto most_ns = static_cast<std::int64_t>(keys_.most_gap.in(nanosecond));
+    if (step.elapsed_ns > most_ns && keys_.pace == Pace::Exact && hasLogRoom()) {
+      logging::info("replay of {}: after {} frames there is none for {:.3f} s, which are shortened to {:.3f} s (most_gap_s)",
+                    info_.serial, played_, seconds(step.elapsed_ns), seconds(most_ns));
+    }
+    return std::chrono::nanoseconds{std::min(step.elapsed_ns, most_ns)};
+  }
+
+  /// A recording may be full of them.
+  bool hasLogRoom() { return ++told_ <= 20; }
 
   /// The next whole frame. What damage took away counts as lost: as many frames as the recorded
   /// sequence numbers leave out there.
@@ -180,6 +204,8 @@ class ReplaySource final : public Source {
     reader_.rewind();
     waiting_.reset();
     paced_.reset();
+    times_.reset();
+    played_before_ += played_;
     played_ = 0;
     damage_ = {};
     damage_before_next_ = false;
@@ -196,12 +222,11 @@ class ReplaySource final : public Source {
 
   Result<> waitForTurn(const std::stop_token& stop) {
     const SteadyTime now = std::chrono::steady_clock::now();
-    const std::int64_t received_ns = waiting_->moment.received.ns;
-    if (!paced_) paced_ = Paced{now, received_ns};
-    // Half of what can be expressed leaves room for the steady clock's own time.
-    const std::int64_t after_ns =
-        std::clamp(minus(received_ns, paced_->received_ns), kLeast_ns / 2, kMost_ns / 2);
-    const SteadyTime due = paced_->since + std::chrono::nanoseconds{after_ns};
+    if (!paced_) {
+      paced_ = now;
+      waits_ = {};
+    }
+    const SteadyTime due = *paced_ + waits_;
     if (!sleepUntil(std::min(due, now + kLongestWait), stop)) {
       return Error{Error::Code::Stopped, "asked to stop"};
     }
@@ -216,7 +241,11 @@ class ReplaySource final : public Source {
   const SourceInfo info_;
   const std::int64_t interval_ns_;  ///< from the last frame to the first of the next round
   std::optional<Frame> waiting_;    ///< read, and due later
-  std::optional<Paced> paced_;
+  std::chrono::nanoseconds waits_{};            ///< it, behind the frame before
+  std::optional<record::FrameTimes> times_;     ///< as recorded, of the frame that was read last
+  std::optional<SteadyTime> paced_;             ///< when the frame before was due
+  std::uint64_t played_before_ = 0;             ///< in earlier rounds
+  int told_ = 0;                                ///< jumps and gaps
   std::uint64_t played_ = 0;         ///< since the beginning of the recording
   Damage damage_;                    ///< since the beginning of the recording
   bool damage_before_next_ = false;  ///< since the last frame that was read

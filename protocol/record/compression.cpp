@@ -97,11 +97,9 @@ std::vector<std::byte> compressZstd(std::span<const std::byte> bytes, int level)
 
 Result<std::vector<std::byte>> decompress(std::string_view compression,
                                           std::span<const std::byte> bytes, std::uint64_t size) {
-  if (size > kMaxChunkBytes) {
-    return Error{
-        Error::Code::TooLarge,
-        fmt::format("says that it holds {} bytes, but {} is the most", size, kMaxChunkBytes)};
-  }
+  const std::uint64_t most = compression.empty() ? kMaxChunkBytes : kMaxUnpackedBytes;
+  if (size > most)
+    return Error{Error::Code::TooLarge, fmt::format("says that it holds {} bytes, but {} is the most", size, most)};
   if (compression == "zstd") return decompressZstd(bytes, size);
   if (compression == "lz4") return decompressLz4(bytes, size);
   if (!compression.empty()) {

@@ -14,6 +14,8 @@ namespace toftwin::record {
 
 /// The most that a chunk may hold, compressed or not; a longer one is an error, not an allocation.
 inline constexpr std::uint64_t kMaxChunkBytes = 1ull << 30;
+/// The most that a compressed chunk may grow to: few bytes can say many.
+inline constexpr std::uint64_t kMaxUnpackedBytes = 256ull << 20;
 
 /// The most that compressZstd can make of so many bytes.
 std::uint64_t mostZstdBytes(std::uint64_t bytes);

@@ -102,14 +102,15 @@ std::uint64_t FileWriter::closedSize(std::uint64_t message_bytes, std::uint64_t 
 Result<> FileWriter::finishChunk() {
   if (failed_) return *failed_;
   if (open_.empty()) return {};
+  const bool is_packed = options_.zstd_level > 0 && open_.size() <= kMaxUnpackedBytes;
   ChunkHead head{.start_time_ns = open_start_ns_,
                  .end_time_ns = open_end_ns_,
                  .uncompressed_size = open_.size(),
                  .uncompressed_crc = crc32(open_),
-                 .compression = options_.zstd_level > 0 ? "zstd" : ""};
+                 .compression = is_packed ? "zstd" : ""};
   Bytes compressed;
-  if (options_.zstd_level > 0) compressed = compressZstd(open_, options_.zstd_level);
-  const std::span<const std::byte> stored = options_.zstd_level > 0 ? compressed : open_;
+  if (is_packed) compressed = compressZstd(open_, options_.zstd_level);
+  const std::span<const std::byte> stored = is_packed ? compressed : open_;
 
   ChunkIndex index{.start_time_ns = head.start_time_ns,
                    .end_time_ns = head.end_time_ns,

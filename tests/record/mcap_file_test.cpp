@@ -298,13 +298,20 @@ TEST(McapReader, AChunkThatLiesAboutItsSizeIsAnErrorWithoutTheMemory) {
   const Bytes stored = compressZstd(records, 1);
   for (std::uint64_t lie :
        {std::uint64_t{records.size()} - 1, std::uint64_t{records.size()} + 1, std::uint64_t{0},
-        kMaxChunkBytes, kMaxChunkBytes + 1, ~std::uint64_t{0}}) {
+        kMaxUnpackedBytes, kMaxUnpackedBytes + 1, kMaxChunkBytes + 1, ~std::uint64_t{0}}) {
     for (const char* compression : {"zstd", "lz4", ""}) {
       const auto message = readOneChunk({5, 5, lie, 0, compression}, stored);
       ASSERT_FALSE(message) << lie;
       EXPECT_THAT(message.error().message, HasSubstr("(a chunk)")) << lie;
     }
   }
+}
+
+TEST(McapReader, APackedChunkMayNotGrowBeyondAQuarterOfAGigabyte) {
+  const Bytes zeros((256u << 20) + 1);
+  const auto unpacked = decompress("zstd", compressZstd(zeros, 1), zeros.size());
+  ASSERT_FALSE(unpacked);
+  EXPECT_EQ(unpacked.error().code, Error::Code::TooLarge);
 }
 
 TEST(McapReader, AnUnknownCompressionIsNamed) {

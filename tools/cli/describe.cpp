@@ -144,6 +144,15 @@ std::string toText(HostTime time) {
   return fmt::format("{:%Y-%m-%d %H:%M:%S}.{:03} UTC", utc, time.ns / 1'000'000 % 1000);
 }
 
+std::string toText(const record::ClockJump& jump) {
+  const auto seconds = [](std::int64_t ns) { return 1e-9 * static_cast<double>(ns); };
+  const bool is_host = jump.clock == record::Jumped::Host;
+  const std::string from = is_host ? toText(HostTime{jump.from_ns}) : fmt::format("{:.3f} s", seconds(jump.from_ns));
+  const std::string to = is_host ? toText(HostTime{jump.to_ns}) : fmt::format("{:.3f} s", seconds(jump.to_ns));
+  return fmt::format("the {}'s clock jumped by {:+.3f} s at frame {}, from {} to {}", is_host ? "host" : "device",
+                     seconds(jump.by_ns), jump.frame, from, to);
+}
+
 std::string namesOf(const std::vector<PlaneKind>& planes) {
   std::string names;
   for (const PlaneKind kind : planes)

@@ -11,6 +11,7 @@
 #include <toftwin/parameter.h>
 
 #include "calib/compare/json.h"
+#include "protocol/record/frame_times.h"
 
 /// Cameras and recordings in words and as JSON, for `toftwin info` and `toftwin replay`.
 namespace toftwin::cli {
@@ -32,6 +33,8 @@ compare::Json toJson(const std::vector<Parameter>& parameters);
 std::string toText(const std::vector<Parameter>& parameters);
 /// Nanoseconds since 1970 as "2026-11-21 08:15:00.123 UTC"; "unknown" for 0.
 std::string toText(HostTime time);
+/// "the host's clock jumped by +1795940967.900 s at frame 25, from 1970-01-01 … to …".
+std::string toText(const record::ClockJump& jump);
 std::string namesOf(const std::vector<PlaneKind>& planes);
 /// "512×424 range, …" of what the frame holds.
 std::string planesOf(const Frame& frame);

@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include <toftwin/names.h>
 
+#include "protocol/record/frame_times.h"
 #include "protocol/record/recording.h"
 #include "sim/sensor/sensor_model.h"
 #include "tools/cli/command.h"
@@ -27,12 +30,13 @@ constexpr std::string_view kPreset = "preset:";
 struct Survey {
   std::map<std::string, Frame> first;  ///< says what the source's camera and planes are
   std::map<std::string, std::uint64_t> readable;
+  std::map<std::string, std::vector<record::FrameTimes>> times;
   std::string damage;
   bool is_whole_file = true;  ///< not cut short by Ctrl-C
 };
 
 Survey survey(record::Reader& reader, const std::string& file) {
-  Survey found{.first = {}, .readable = {}, .damage = reader.summary().damage};
+  Survey found{.first = {}, .readable = {}, .times = {}, .damage = reader.summary().damage};
   const auto add = [&](const std::string& line) {
     found.damage += (found.damage.empty() ? "" : "\n") + line;
   };
@@ -44,6 +48,7 @@ Survey survey(record::Reader& reader, const std::string& file) {
       auto frame = reader.next();
       if (frame) {
         ++found.readable[frame->source];
+        found.times[frame->source].push_back(record::FrameTimes::of(*frame));
         found.first.try_emplace(frame->source, *std::move(frame));
         progress.show(++read);
       } else if (frame.error().code == Error::Code::EndOfStream) {
@@ -64,14 +69,34 @@ Survey survey(record::Reader& reader, const std::string& file) {
   return found;
 }
 
+/// Of the source that was recorded longest, in seconds: what passed, whatever clocks were set meanwhile.
+double lengthOf(const Survey& found) {
+  std::int64_t longest_ns = 0;
+  for (const auto& [source, times] : found.times) longest_ns = std::max(longest_ns, record::recordedTime(times).length_ns);
+  return 1e-9 * static_cast<double>(longest_ns);
+}
+
+/// How long a source was recorded, and which clocks jumped meanwhile.
+void describeTime(const std::vector<record::FrameTimes>& frames, std::string& text, Json& about) {
+  constexpr std::size_t kMostLines = 10;
+  const record::RecordedTime time = record::recordedTime(frames);
+  const double length_s = 1e-9 * static_cast<double>(time.length_ns), gap_s = 1e-9 * static_cast<double>(time.longest_gap_ns);
+  text += fmt::format("length       {:.3f} s, longest gap {:.3f} s\n", length_s, gap_s);
+  std::vector<std::string> jumps;
+  for (const record::ClockJump& jump : time.jumps) jumps.push_back(toText(jump));
+  for (std::size_t i = 0; i < std::min(jumps.size(), kMostLines); ++i) text += fmt::format("clock        {}\n", jumps[i]);
+  if (jumps.size() > kMostLines) text += fmt::format("clock        and {} more jumps\n", jumps.size() - kMostLines);
+  about.set("length_s", length_s).set("longest_gap_s", gap_s).set("clock_jumps", Json::arrayOf(jumps));
+}
+
 Result<Exit> describeRecording(const Options& options) {
   auto reader = record::Reader::open(options.what);
   if (!reader) return reader.error();
   const record::Summary& summary = reader->summary();
-  const double seconds = 1e-9 * static_cast<double>(summary.last_ns - summary.first_ns);
   catchInterrupts();
   const Survey found = survey(*reader, options.what);
   if (!found.is_whole_file) return Exit::Interrupted;
+  const double seconds = lengthOf(found);
   Json sources = Json::object();
   std::string text = fmt::format("{}: recording, {:.3f} s from {}\nindex        {}\n", options.what,
                                  seconds, toText(HostTime{summary.first_ns}),
@@ -81,6 +106,7 @@ Result<Exit> describeRecording(const Options& options) {
     const auto readable = found.readable.find(source);
     Json about = Json::object().set("frames", frames).set(
         "readable_frames", readable == found.readable.end() ? std::uint64_t{0} : readable->second);
+    if (const auto times = found.times.find(source); times != found.times.end()) describeTime(times->second, text, about);
     if (const auto first = found.first.find(source); first != found.first.end()) {
       const Frame& frame = first->second;
       text += fmt::format("kind         {}\nplanes       {}\n{}", nameOf(frame.provenance.kind),
@@ -93,6 +119,7 @@ Result<Exit> describeRecording(const Options& options) {
   if (options.json) {
     fmt::print("{}", Json::object()
                          .set("file", options.what)
+                         .set("length_s", seconds)
                          .set("first_ns", summary.first_ns)
                          .set("last_ns", summary.last_ns)
                          .set("indexed", summary.indexed)

@@ -22,7 +22,7 @@ struct TimedPoseSpec : compare::PoseSpec {
   void visit(Visitor& v) {
     compare::PoseSpec::visit(v);
     v.quantity(
-        "time", time, second, {0.0, 1e9},
+        "time", time, second, {0.0, 9e9},
         "when the camera is there, since device time 0; each later than the one before. In all poses or "
         "in none: then it stands still at each for one frame");
   }

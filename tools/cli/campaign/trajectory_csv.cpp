@@ -17,7 +17,7 @@ namespace toftwin::cli {
 namespace {
 
 constexpr std::array<std::string_view, 8> kColumns{"time_s", "x_m", "y_m", "z_m", "q_w", "q_x", "q_y", "q_z"};
-constexpr double kMostPosition_m = 1e6, kMostTime_s = 1e9;  // as in a pose file
+constexpr double kMostPosition_m = 1e6, kMostTime_s = 9e9;  // as in a pose file
 
 std::vector<std::string_view> split(std::string_view line) {
   std::vector<std::string_view> fields;
