@@ -13,6 +13,7 @@
 
 #include "daemon/thrown.h"
 #include "protocol/settings/describe.h"
+#include "protocol/settings/endable.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -109,7 +110,7 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
       table.resolve("").string() + "\n" + table.canonicalText() + "\n" + stampsOf(table, log);
   const bool is_as_before = std::ranges::find(running, fingerprint) != running.end();
   ConfiguredSource source{std::move(keys), driver, table, nullptr, std::move(fingerprint), is_as_before};
-  if (driver == nullptr) return source;
+  if (driver == nullptr || settings::EndableReading::now().stop_requested()) return source;
   if (is_as_before) {
     table.acceptAll();
   } else {
@@ -196,6 +197,7 @@ Result<Config> readConfig(settings::Table& table, std::span<const drivers::Drive
   for (settings::Table& below : table.tables("facade")) {
     config.facades.push_back(readFacade(below, facades, names));
   }
+  if (settings::EndableReading::now().stop_requested()) return Error{Error::Code::Stopped, "asked to stop while reading the configuration"};
   if (auto checked = table.check(); !checked) return checked.error();
   config.recording_folder = recordingFolder(config.keys, table);
   return config;
@@ -205,9 +207,10 @@ Result<Config> readConfig(settings::Table& table, std::span<const drivers::Drive
 
 Result<Config> loadConfig(const std::filesystem::path& file,
                           std::span<const drivers::Driver> drivers,
-                          const std::vector<std::string>& running) {
+                          const std::vector<std::string>& running, std::stop_token stop) {
   auto table = settings::Table::load(file);
   if (!table) return table.error();
+  const settings::EndableReading endable{std::move(stop)};
   return readConfig(*table, drivers, running, allFacades());
 }
 

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <span>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -167,10 +168,10 @@ struct Config {
 
 /// Reads a configuration and opens its sources, except those whose fingerprint is in `running`. A
 /// camera that is not there is no error: it is tried again while the daemon runs. Nor is a facade that this
-/// build lacks. Error: everything that is wrong in the file, with file and line.
+/// build lacks. Error: everything that is wrong in the file, with file and line; or Stopped, soon after `stop` asks.
 Result<Config> loadConfig(const std::filesystem::path& file,
                           std::span<const drivers::Driver> drivers,
-                          const std::vector<std::string>& running = {});
+                          const std::vector<std::string>& running = {}, std::stop_token stop = {});
 /// From text, for tests; `name` stands for the file.
 Result<Config> parseConfig(std::string_view toml, const std::filesystem::path& name,
                            std::span<const drivers::Driver> drivers,

@@ -100,6 +100,7 @@ Daemon::Loop::Loop(Options options, const Config& config)
       listen_(config.keys.listen) {}
 
 Daemon::Loop::~Loop() {
+  reload_stop_.request_stop();
   if (reload_.valid()) reload_.wait();
 }
 
@@ -212,16 +213,19 @@ void Daemon::Loop::reload() {
 void Daemon::Loop::beginReload() {
   if (is_stopping_) return;
   if (reload_.valid()) {
+    logging::info("the reading that is under way is ended, and begins anew");
+    reload_stop_.request_stop();
     reload_again_ = true;
     return;
   }
+  reload_stop_ = {};
   notify::reloading();
   logging::info("reading {} again", options_.config.string());
   // Opening a source may take its time, during which clients are served.
   try {
-    reload_ = std::async(std::launch::async, [this, running = fingerprints()] {
+    reload_ = std::async(std::launch::async, [this, running = fingerprints(), stop = reload_stop_.get_token()] {
       try {
-        loaded_ = loadConfig(options_.config, options_.drivers, running);
+        loaded_ = loadConfig(options_.config, options_.drivers, running, stop);
       } catch (...) {
         loaded_ = thrownError("reading it");
       }
@@ -240,7 +244,7 @@ void Daemon::Loop::finishReload() {
   if (config) {
     apply(*std::move(config));
     logging::info("the new configuration is in force");
-  } else {
+  } else if (config.error().code != Error::Code::Stopped) {
     logging::error("the configuration stays as it was, because the new one is wrong:\n{}",
                    config.error().message);
   }
@@ -321,6 +325,7 @@ void Daemon::Loop::stop() {
 void Daemon::Loop::beginStop() {
   if (std::exchange(is_stopping_, true)) return;
   notify::stopping();
+  reload_stop_.request_stop();
   watchdog_.cancel();
   // A second SIGTERM or SIGINT ends the process, should a driver be stuck; SIGHUP means nothing now.
   boost::system::error_code ignored;

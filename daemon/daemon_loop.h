@@ -11,6 +11,7 @@
 #include <future>
 #include <memory>
 #include <optional>
+#include <stop_token>
 #include <string>
 #include <vector>
 
@@ -75,6 +76,7 @@ class Daemon::Loop {
   std::vector<Running> running_;
   std::optional<Result<Config>> loaded_;  ///< by the reload under way, which `reload_` ends
   std::future<void> reload_;
+  std::stop_source reload_stop_;  ///< of the reload under way
   bool reload_again_ = false;
   bool is_stopping_ = false;
   bool is_waiting_for_signal_ = false;

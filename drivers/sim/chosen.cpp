@@ -10,6 +10,7 @@
 
 #include "drivers/lens.h"
 #include "drivers/sim/default_scene.h"
+#include "protocol/settings/endable.h"
 #include "sim/sensor/frame_assembly.h"
 
 namespace toftwin::drivers::simulator {
@@ -81,9 +82,13 @@ sim::SensorModel withCalibration(sim::SensorModel model, const Keys& keys, setti
   return model;
 }
 
+sim::SceneLoading loadingOf(const Keys& keys) {
+  return {.stop = settings::EndableReading::now(), .may_convert = keys.convert_meshes};
+}
+
 std::optional<sim::Scene> chosenScene(const Keys& keys, settings::Table& table) {
   auto scene = keys.scene.empty() ? sim::Scene::parse(kDefaultScene, "default scene")
-                                  : sim::Scene::load(table.resolve(keys.scene));
+                                  : sim::Scene::load(table.resolve(keys.scene), sim::Band::Infrared, loadingOf(keys));
   if (scene) return *std::move(scene);
   table.complain("scene", fmt::format("= \"{}\": {}", keys.scene, scene.error().message));
   return std::nullopt;
@@ -94,7 +99,7 @@ bool wantsColor(const std::vector<PlaneKind>& planes) { return std::ranges::coun
 /// Nothing if no colours are wanted, or after complaining.
 std::optional<ColorView> chosenColor(const Keys& keys, const sim::SensorModel& model, settings::Table& table) {
   auto visible = keys.scene.empty() ? sim::parseVisible(kDefaultScene, "default scene")
-                                    : sim::loadVisible(table.resolve(keys.scene));
+                                    : sim::loadVisible(table.resolve(keys.scene), loadingOf(keys));
   if (!visible) {
     table.complain("scene", fmt::format("= \"{}\": {}", keys.scene, visible.error().message));
     return std::nullopt;

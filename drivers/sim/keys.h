@@ -40,6 +40,7 @@ struct Keys {
   std::string camera;
   std::string calibration;
   std::string scene;
+  bool convert_meshes = false;
   Mode mode = Mode::Unbiased;
   sim::Sampler sampler = sim::Sampler::Shared;
   int samples_per_pixel = 4;
@@ -66,6 +67,9 @@ struct Keys {
     v.text("calibration", calibration, kCalibrationHelp);
     v.text("scene", scene,
            "path of a scene file, relative to this file; empty: a box before a wall");
+    v.flag("convert_meshes", convert_meshes,
+           "lets a program of its own convert meshes that are neither OBJ, PLY, STL nor glTF (DAE, FBX, 3DS, …), within "
+           "1 GiB of memory and 30 s of processor time");
     v.choice("mode", mode, {{"unbiased", Mode::Unbiased}, {"realtime", Mode::RealTime}},
              "how light is traced: exactly but for noise, or frame after frame at the camera's pace, with "
              "light over several surfaces kept, smoothed and some millimetres wrong");

@@ -21,6 +21,7 @@
 #include "sim/sensor/lens_off_axis.h"
 #include "sim/sensor/sensor_model.h"
 #include "sim/tracer/missing_light.h"
+#include "sim/tracer/objects.h"
 
 namespace toftwin::drivers::simulator {
 namespace {
@@ -402,6 +403,9 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
     logging::warn("{}: {}", table.place("scene"), *missing);
   if (const auto off_axis = sim::lensOffAxis(chosen->model.camera()))
     logging::warn("{}: {}", table.place(table.has("camera") ? "camera" : "uri"), *off_axis);
+  for (const std::string& note : chosen->scene.notes()) logging::warn("{}: {}", table.place("scene"), note);
+  if (const auto nothing = sim::seesNothing(chosen->scene, chosen->model.camera(), startPose(chosen->keys)))
+    logging::warn("{}: {}", table.place(table.has("scene") ? "scene" : ""), *nothing);
   auto interferences = chosen->model.interferences(chosen->scene.foreignEmitters());
   View view{std::move(chosen->scene), std::move(request), std::move(interferences), motionOf(chosen->keys),
             chosen->model.rowDelay()};

@@ -43,8 +43,8 @@ Result<VisibleScene> inThreeBands(const Load& load) {
 
 }  // namespace
 
-Result<VisibleScene> loadVisible(const std::filesystem::path& scene_file) {
-  return inThreeBands([&](Band band) { return Scene::load(scene_file, band); });
+Result<VisibleScene> loadVisible(const std::filesystem::path& scene_file, const SceneLoading& how) {
+  return inThreeBands([&](Band band) { return Scene::load(scene_file, band, how); });
 }
 
 Result<VisibleScene> parseVisible(std::string_view toml, const std::filesystem::path& name) {

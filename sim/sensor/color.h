@@ -16,7 +16,7 @@ namespace toftwin::sim {
 /// The scene in the three bands of a colour camera: materials with their colours instead of their
 /// infrared albedo. Lamps and surroundings shine in them as they do in the infrared.
 using VisibleScene = std::array<Scene, 3>;
-Result<VisibleScene> loadVisible(const std::filesystem::path& scene_file);
+Result<VisibleScene> loadVisible(const std::filesystem::path& scene_file, const SceneLoading& how = {});
 Result<VisibleScene> parseVisible(std::string_view toml, const std::filesystem::path& name);
 
 /// Traces one band of an image: the whole request, or in bands of rows with progress shown.

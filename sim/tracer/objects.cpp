@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/tracer/objects.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 
@@ -55,11 +57,21 @@ Image<std::int32_t> objectsSeen(const Scene& scene, const CameraInfo& camera,
       castRays(scene.impl(), row.valid, row.rays, true);
       for (int i = 0; i < std::min(embree::kLanes, camera.width - x); ++i) {
         const unsigned met = row.rays.hit.geomID[i];
-        if (met != RTC_INVALID_GEOMETRY_ID) objects(x + i, y) = static_cast<std::int32_t>(met);
+        if (met != RTC_INVALID_GEOMETRY_ID) objects(x + i, y) = scene.impl().numbers[met];
       }
     }
   }
   return objects;
+}
+
+std::optional<std::string> seesNothing(const Scene& scene, const CameraInfo& camera,
+                                       const Transform<World, Camera>& world_from_camera) {
+  const auto objects = objectsSeen(scene, camera, world_from_camera);
+  if (std::ranges::any_of(objects.pixels(), [](std::int32_t number) { return number >= 0; })) return std::nullopt;
+  const Vec3d &from = world_from_camera.translation_m, &middle = scene.impl().origin_in_world;
+  return fmt::format("no ray from this pose, at ({:.4g}, {:.4g}, {:.4g}) m, meets anything; the scene's middle is at ({:.4g}, {:.4g}, "
+                     "{:.4g}) m, and it is {:.4g} m across",
+                     from.x, from.y, from.z, middle.x, middle.y, middle.z, scene.impl().diagonal_m);
 }
 
 }  // namespace toftwin::sim

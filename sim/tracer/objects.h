@@ -2,6 +2,8 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
+#include <string>
 
 #include <toftwin/camera_info.h>
 #include <toftwin/geometry.h>
@@ -15,5 +17,9 @@ namespace toftwin::sim {
 /// 0, or −1 where it meets nothing. Glass counts as an object.
 Image<std::int32_t> objectsSeen(const Scene& scene, const CameraInfo& camera,
                                 const Transform<World, Camera>& world_from_camera);
+
+/// If no pixel's central ray meets anything: that, and where the scene is, in words for whoever set the pose.
+std::optional<std::string> seesNothing(const Scene& scene, const CameraInfo& camera,
+                                       const Transform<World, Camera>& world_from_camera);
 
 }  // namespace toftwin::sim

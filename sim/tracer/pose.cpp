@@ -149,6 +149,8 @@ Scene Scene::at(Duration time) const {
   posed->textures = loaded->textures;
   posed->environment = loaded->environment;
   posed->objects = loaded->objects;
+  posed->notes = loaded->notes;
+  posed->numbers = loaded->numbers;
   posed->foreign_emitters = loaded->foreign_emitters;
   posed->ambient_radiance = loaded->ambient_radiance;
   posed->is_matt = loaded->is_matt;

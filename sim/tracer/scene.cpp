@@ -8,7 +8,6 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <optional>
 
 #include "protocol/settings/describe.h"
 #include "sim/tracer/hit.h"
@@ -19,6 +18,7 @@
 #include "sim/tracer/scene_embree.h"
 #include "sim/tracer/scene_file.h"
 #include "sim/tracer/scene_impl.h"
+#include "sim/tracer/scene_meshes.h"
 
 namespace toftwin::sim {
 namespace {
@@ -77,17 +77,24 @@ struct Box {
   }
 };
 
-Result<TriangleMesh> meshOf(const PlacedObject& object) {
+TriangleMesh meshOf(const PlacedObject& object) {
   const auto& spec = object.spec;
   if (spec.shape == Shape::Rectangle) return rectangleMesh(spec.size_m[0], spec.size_m[1]);
   if (spec.shape == Shape::Box) return boxMesh(spec.size_m[0], spec.size_m[1], spec.size_m[2]);
-  auto mesh = loadMesh(object.mesh);
-  if (!mesh) return Error{mesh.error().code, fmt::format("{}: {}", object.place, mesh.error().message)};
-  return mesh;
+  return *object.triangles;
+}
+
+/// The materials' colours instead of their infrared albedo.
+void showIn(Band band, std::vector<MaterialSpec>& materials) {
+  if (band == Band::Infrared) return;
+  const std::size_t channel = band == Band::Red ? 0 : band == Band::Green ? 1 : 2;
+  for (MaterialSpec& material : materials) {
+    if (!material.color.empty()) material.albedo = material.color[channel];
+  }
 }
 
 Result<Image<float>> pictureOf(const NamedFile& file) {
-  auto picture = loadGrey(file.path);
+  auto picture = file.bytes.empty() ? loadGrey(file.path) : decodeGrey(file.bytes, "of a mesh file");
   if (!picture)
     return Error{picture.error().code, fmt::format("{}: {}", file.place, picture.error().message)};
   return picture;
@@ -105,37 +112,31 @@ Scene::Impl::~Impl() {
 }
 
 const std::string& Scene::id() const { return impl_->id; }
+const std::vector<std::string>& Scene::notes() const { return impl_->notes; }
 const std::vector<ForeignEmitterSpec>& Scene::foreignEmitters() const { return impl_->foreign_emitters; }
 
 /// The steps from a checked file to a built scene.
 struct SceneBuilder {
-  explicit SceneBuilder(const SceneFile& f) : file(f) {}
+  SceneBuilder(const SceneFile& f, const SceneLoading& h) : file(f), how(h) {}
 
-  const SceneFile& file;
+  const SceneFile& file;  ///< with its meshes read
+  const SceneLoading& how;
   std::vector<TriangleMesh> meshes;  ///< in their own frames, scaled; empty for quadrics
   Hash hash;
   std::shared_ptr<Scene::Impl> scene = std::make_shared<Scene::Impl>();
 
-  Result<> loadMeshes() {
-    std::optional<Error> wrong;  // all meshes that are, one a line
+  Result<> takeMeshes() {
     for (const PlacedObject& object : file.objects) {
       TriangleMesh& mesh = meshes.emplace_back();
-      hash.addSettings(object.spec, {"name", "mesh"});
+      hash.addSettings(object.spec, {"name", "mesh", "unit", "up"});  // the last two change vertices
       for (const KeyframeSpec& frame : object.spec.keyframes) hash.addSettings(frame);
       if (isQuadric(object.spec.shape)) continue;
-      auto loaded = meshOf(object);
-      if (!loaded) {
-        if (wrong)
-          wrong->message += "\n" + loaded.error().message;
-        else
-          wrong = loaded.error();
-        continue;
-      }
-      mesh = *std::move(loaded);
+      mesh = meshOf(object);
       hash.add(mesh.vertices.data(), mesh.vertices.size() * sizeof(mesh.vertices[0]));
       hash.add(mesh.triangles.data(), mesh.triangles.size() * sizeof(mesh.triangles[0]));
       for (Vec3d& v : mesh.vertices) v = v * object.spec.scale;
-      if (file.textures[object.material].path.empty()) {
+      const NamedFile& texture = file.textures[*object.material];
+      if (!texture.isThere()) {
         mesh.places.clear();
         continue;
       }
@@ -143,10 +144,9 @@ struct SceneBuilder {
       if (mesh.places.empty()) {
         return Error{Error::Code::InvalidArgument,
                      fmt::format("{}: material \"{}\" has a texture, but mesh {} has no texture coordinates",
-                                 object.place, object.spec.material, object.mesh.string())};
+                                 object.place, file.spec.materials[*object.material].name, object.mesh.string())};
       }
     }
-    if (wrong) return *std::move(wrong);
     return {};
   }
 
@@ -160,7 +160,7 @@ struct SceneBuilder {
         material.special = static_cast<std::uint16_t>(scene->models.size());
         scene->has_glass |= spec.model == Reflection::ThinGlass;
       }
-      if (!file.textures[i].path.empty()) {
+      if (file.textures[i].isThere()) {
         auto picture = pictureOf(file.textures[i]);
         if (!picture) return picture.error();
         for (float& value : picture->pixels()) {
@@ -215,7 +215,7 @@ struct SceneBuilder {
   /// An object in its own frame, without planes.
   BuiltObject ownOf(std::size_t i) {
     BuiltObject object;
-    object.material = file.objects[i].material;
+    object.material = *file.objects[i].material;
     if (isQuadric(file.objects[i].spec.shape)) object.quadric = quadricOf(file.objects[i].spec);
     object.vertices = std::move(meshes[i].vertices);
     object.triangles = std::move(meshes[i].triangles);
@@ -231,6 +231,7 @@ struct SceneBuilder {
     for (std::size_t i = 0; i < file.objects.size(); ++i) {
       BuiltObject& object = scene->owned.emplace_back(ownOf(i));
       scene->objects.emplace_back(object);
+      scene->numbers.push_back(static_cast<std::int32_t>(file.objects[i].number));
       Transform<World, Object> pose = file.objects[i].world_from_object;
       pose.translation_m = pose.translation_m - scene->origin_in_world;
       if (!file.objects[i].motion.isStill()) {
@@ -275,11 +276,14 @@ struct SceneBuilder {
       if (file.objects[i].motion.isStill())
         still.push_back({static_cast<unsigned>(i), &scene->objects[i].get()});
     }
-    scene->still = makeEmbreeScene(scene->device, still);
+    const Error stopped{Error::Code::Stopped, "asked to stop while building a scene"};
+    scene->still = makeEmbreeScene(scene->device, still, how.stop);
+    if (how.stop.stop_requested()) return stopped;
     takeFew(still);
     for (Mover& mover : scene->movers) {
       const BuiltObject& object = scene->objects[mover.object];
-      mover.embree = makeEmbreeScene(scene->device, {{static_cast<unsigned>(mover.object), &object}});
+      mover.embree = makeEmbreeScene(scene->device, {{static_cast<unsigned>(mover.object), &object}}, how.stop);
+      if (how.stop.stop_requested()) return stopped;
       RTCBounds box;
       rtcGetSceneBounds(mover.embree, &box);
       mover.radius = radiusOf(object, box);
@@ -296,11 +300,15 @@ struct SceneBuilder {
     return {};
   }
 
-  static Result<Scene> build(const Result<SceneFile>& file) {
+  static Result<Scene> build(Result<SceneFile> file, Band band, const SceneLoading& how) {
     if (!file) return file.error();
-    SceneBuilder builder{*file};
+    auto notes = readMeshes(*file, how);
+    if (!notes) return notes.error();
+    showIn(band, file->spec.materials);
+    SceneBuilder builder{*file, how};
+    builder.scene->notes = *std::move(notes);
     if (auto loaded = builder.loadMaterials(); !loaded) return loaded.error();
-    if (auto loaded = builder.loadMeshes(); !loaded) return loaded.error();
+    if (auto taken = builder.takeMeshes(); !taken) return taken.error();
     if (auto loaded = builder.loadSurroundings(); !loaded) return loaded.error();
     builder.scene->id = builder.hash.hex();
     builder.chooseOrigin();
@@ -310,26 +318,12 @@ struct SceneBuilder {
   }
 };
 
-namespace {
-
-/// The scene with the materials' colours instead of their infrared albedo.
-Result<SceneFile> inBand(Result<SceneFile> file, Band band) {
-  if (!file || band == Band::Infrared) return file;
-  const std::size_t channel = band == Band::Red ? 0 : band == Band::Green ? 1 : 2;
-  for (MaterialSpec& material : file->spec.materials) {
-    if (!material.color.empty()) material.albedo = material.color[channel];
-  }
-  return file;
+Result<Scene> Scene::load(const std::filesystem::path& file, Band band, const SceneLoading& how) {
+  return SceneBuilder::build(loadSceneFile(file), band, how);
 }
 
-}  // namespace
-
-Result<Scene> Scene::load(const std::filesystem::path& file, Band band) {
-  return SceneBuilder::build(inBand(loadSceneFile(file), band));
-}
-
-Result<Scene> Scene::parse(std::string_view toml, const std::filesystem::path& name, Band band) {
-  return SceneBuilder::build(inBand(parseSceneFile(toml, name), band));
+Result<Scene> Scene::parse(std::string_view toml, const std::filesystem::path& name, Band band, const SceneLoading& how) {
+  return SceneBuilder::build(parseSceneFile(toml, name), band, how);
 }
 
 }  // namespace toftwin::sim

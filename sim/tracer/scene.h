@@ -3,6 +3,7 @@
 
 #include <filesystem>
 #include <memory>
+#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -17,20 +18,29 @@ enum class Band { Infrared, Red, Green, Blue };
 
 struct ForeignEmitterSpec;
 
+/// How a scene is loaded.
+struct SceneLoading {
+  std::stop_token stop;      ///< ends it soon, with the error Stopped
+  bool may_convert = false;  ///< of mesh files: ReadOptions::may_convert
+};
+
 /// A built scene: meshes and primitives with their materials, ready to trace. Cheap to copy; copies
 /// share the geometry, which nobody changes.
 class Scene {
  public:
   /// From a scene file (docs/scene.md). Errors name file, line and key; a mesh that is missing, empty
   /// or holds NaN vertices is an error naming mesh and vertex.
-  static Result<Scene> load(const std::filesystem::path& file, Band band = Band::Infrared);
+  static Result<Scene> load(const std::filesystem::path& file, Band band = Band::Infrared, const SceneLoading& how = {});
   /// From text; `name` stands for the file in errors, and mesh paths start at its folder.
   static Result<Scene> parse(std::string_view toml, const std::filesystem::path& name,
-                             Band band = Band::Infrared);
+                             Band band = Band::Infrared, const SceneLoading& how = {});
 
   /// Content hash over what the scene says and the meshes it uses; 32 hex digits. Comments, order of
   /// keys and file names do not count.
   [[nodiscard]] const std::string& id() const;
+
+  /// What people should know of its meshes: triangles that were left out, a size that cannot be meant.
+  [[nodiscard]] const std::vector<std::string>& notes() const;
 
   /// Whether anything in it moves by itself.
   [[nodiscard]] bool moves() const;

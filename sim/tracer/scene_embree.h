@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <stop_token>
 #include <vector>
 
 #include "sim/tracer/scene_impl.h"
@@ -13,7 +14,8 @@ struct NumberedObject {
   const BuiltObject* object;
 };
 
-/// An Embree scene of these objects, ready to be traced. They must outlive it.
-RTCScene makeEmbreeScene(RTCDevice device, const std::vector<NumberedObject>& objects);
+/// An Embree scene of these objects, ready to be traced. They must outlive it. If `stop` asks, it ends early and must
+/// not be traced.
+RTCScene makeEmbreeScene(RTCDevice device, const std::vector<NumberedObject>& objects, const std::stop_token& stop);
 
 }  // namespace toftwin::sim

@@ -81,7 +81,7 @@ void checkKeysFitShape(Table& table, const ObjectSpec& object) {
   const auto only = [&](const char* key, bool is_used) {
     if (table.has(key) && !is_used) table.complain(key, "has no meaning for this shape; remove it");
   };
-  only("mesh", shape == Shape::Mesh);
+  for (const char* key : {"mesh", "unit", "up"}) only(key, shape == Shape::Mesh);
   only("size_m", shape == Shape::Box || shape == Shape::Rectangle);
   only("radius_m", shape == Shape::Sphere || shape == Shape::Cylinder || shape == Shape::Disc);
   only("height_m", shape == Shape::Cylinder);
@@ -198,6 +198,11 @@ void readForeignEmitters(Table& root, SceneSpec& scene) {
   }
 }
 
+/// Formats that say what surfaces are like.
+bool hasMaterials(const ObjectSpec& object) {
+  return object.shape == Shape::Mesh && (object.file.ends_with(".gltf") || object.file.ends_with(".glb"));
+}
+
 PlacedObject readObject(Table& table, const SceneSpec& scene) {
   PlacedObject object;
   object.place = table.place();
@@ -213,7 +218,9 @@ PlacedObject readObject(Table& table, const SceneSpec& scene) {
   }
   const auto material = std::find_if(scene.materials.begin(), scene.materials.end(),
                                      [&](const auto& m) { return m.name == spec.material; });
-  if (material == scene.materials.end()) {
+  if (spec.material.empty() && hasMaterials(spec)) {
+    // Its file's own.
+  } else if (material == scene.materials.end()) {
     std::string known;
     for (const auto& m : scene.materials) known += (known.empty() ? "" : ", ") + m.name;
     if (spec.material.empty())

@@ -3,6 +3,8 @@
 
 #include <array>
 #include <filesystem>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -12,6 +14,7 @@
 #include <toftwin/result.h>
 #include <toftwin/units.h>
 
+#include "sim/meshes/mesh_file.h"
 #include "sim/tracer/motion.h"
 
 namespace toftwin::sim {
@@ -27,6 +30,9 @@ enum class Reflection {
   ThinGlass
 };
 enum class TextureCoding { Linear, Srgb };
+/// Which of a mesh file's axes points up; the scene's is −y.
+enum class Up { MinusY, Y, Z };
+enum class LengthUnit { Metre, Centimetre, Millimetre, Inch, Foot };
 enum class Shape { Rectangle, Box, Sphere, Cylinder, Disc, Mesh };
 
 /// What a surface does with light. Both sides of a surface are alike.
@@ -126,6 +132,8 @@ struct ObjectSpec {
   std::array<double, 4> rotation_wxyz{1.0, 0.0, 0.0, 0.0};
   std::array<double, 3> euler_deg{};
   double scale = 1.0;
+  LengthUnit unit = LengthUnit::Metre;
+  Up up = Up::MinusY;
   std::string material;
   std::array<double, 3> velocity_m_per_s{};
   std::array<double, 3> rotation_rate_deg_per_s{};
@@ -145,7 +153,7 @@ struct ObjectSpec {
               {"disc", Shape::Disc},
               {"mesh", Shape::Mesh}},
              "what it is; to be said, unless `mesh` names a file");
-    v.text("mesh", file, "mesh: OBJ, PLY, glTF or GLB file in metres, relative to the scene file");
+    v.text("mesh", file, "mesh: OBJ, PLY, STL, glTF or GLB file, relative to the scene file");
     v.numbers(
         "size_m", size_m, {0.0, 1e5},
         "box: edges along x, y, z; rectangle: edges along x and y (its normal is z), the third is not used");
@@ -158,7 +166,17 @@ struct ObjectSpec {
     v.numbers("euler_deg", euler_deg, {-360.0, 360.0},
               "orientation instead of the quaternion: turn about the fixed world axes x, then y, then z");
     v.number("scale", scale, {1e-6, 1e6}, "factor on all its lengths");
-    v.text("material", material, "name of a material");
+    v.choice("unit", unit,
+             {{"m", LengthUnit::Metre},
+              {"cm", LengthUnit::Centimetre},
+              {"mm", LengthUnit::Millimetre},
+              {"in", LengthUnit::Inch},
+              {"ft", LengthUnit::Foot}},
+             "mesh: in which its file's coordinates are");
+    v.choice("up", up, {{"-y", Up::MinusY}, {"y", Up::Y}, {"z", Up::Z}},
+             "mesh: its file's axis that is turned to the scene's up, -y; x stays x");
+    v.text("material", material,
+           "name of a material; may be left out for glTF and GLB files, which have materials of their own");
     v.numbers("velocity_m_per_s", velocity_m_per_s, {-1e4, 1e4},
               "how fast it moves in the world; its position is that at time 0");
     v.numbers("rotation_rate_deg_per_s", rotation_rate_deg_per_s, {-36000.0, 36000.0},
@@ -266,17 +284,21 @@ struct SceneSpec {
 /// the file it was written.
 struct PlacedObject {
   ObjectSpec spec;
-  std::size_t material = 0;
+  std::optional<std::size_t> material;  ///< none: those of its mesh file
   Transform<World, Object> world_from_object;  ///< without the scale
   Motion motion;
   std::filesystem::path mesh;
-  std::string place;  ///< "scene.toml:12"
+  std::string place;       ///< "scene.toml:12"
+  std::size_t number = 0;  ///< of the object in the file; the same for all that a mesh file's surfaces make of it
+  std::shared_ptr<const TriangleMesh> triangles = nullptr;  ///< of a mesh once it is read; shared by copies
 };
 
 /// A file that the scene names, and where it does.
 struct NamedFile {
-  std::filesystem::path path;  ///< empty: none
-  std::string place;           ///< "scene.toml:12"
+  std::filesystem::path path;         ///< empty: none
+  std::string place;                  ///< "scene.toml:12"
+  std::vector<std::byte> bytes = {};  ///< instead of a file: what it would hold
+  [[nodiscard]] bool isThere() const { return !path.empty() || !bytes.empty(); }
 };
 
 struct SceneFile {

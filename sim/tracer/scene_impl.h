@@ -105,6 +105,8 @@ struct Scene::Impl {
   ~Impl();
 
   std::string id;
+  std::vector<std::string> notes;
+  std::vector<std::int32_t> numbers;  ///< of `objects` in the scene file
   std::vector<Material> materials;
   std::vector<bsdf::Any> models;  ///< of the materials; `Material::special` points here
   std::vector<std::shared_ptr<const Texture>> textures;  // shared by a scene's poses

@@ -7,12 +7,9 @@
 
 #include <toftwin/image.h>
 
-namespace toftwin::sim {
+#include "sim/meshes/triangle_mesh.h"
 
-/// A place on a picture: (0, 0) is its top left corner, (1, 1) its bottom right one.
-struct TexturePlace {
-  float u = 0.0f, v = 0.0f;
-};
+namespace toftwin::sim {
 
 /// A picture laid over a surface, repeated beyond its edges. Between pixels' centres it is bilinear.
 class Texture {

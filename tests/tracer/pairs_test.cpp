@@ -8,6 +8,7 @@
 #include <fstream>
 #include <functional>
 
+#include "sim/meshes/mesh_file.h"
 #include "sim/tracer/mesh.h"
 #include "tests/tracer/tracing.h"
 
@@ -84,9 +85,9 @@ TEST(PairsOfTriangles, AreKnownByTheirOrder) {
 TEST_F(Pairs, OfAFileAreKnown) {
   for (const bool is_turned : {false, true}) {
     std::ofstream{folder_ / "wall.obj"} << wall([](double, double) { return 0.0; }, is_turned);
-    const auto mesh = loadMesh(folder_ / "wall.obj");
-    ASSERT_TRUE(mesh);
-    EXPECT_EQ(areInPairs(mesh->vertices, mesh->triangles), !is_turned);
+    const auto read = meshes::readMeshFile(folder_ / "wall.obj");
+    ASSERT_TRUE(read);
+    EXPECT_EQ(areInPairs(read->mesh.vertices, read->mesh.triangles), !is_turned);
   }
 }
 

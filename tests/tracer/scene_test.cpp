@@ -88,7 +88,7 @@ TEST_F(SceneFiles, AMissingOrEmptyOrBrokenMeshIsNamed) {
   std::filesystem::create_directory(folder_ / "dir.ply");
   EXPECT_THAT(errorOfMesh("dir.ply"), HasSubstr("it is a folder"));
   write("mesh.xyzw", "x");
-  EXPECT_THAT(errorOfMesh("mesh.xyzw"), HasSubstr("OBJ, PLY, glTF and GLB can"));
+  EXPECT_THAT(errorOfMesh("mesh.xyzw"), HasSubstr("OBJ, PLY, STL, glTF and GLB can"));
   const std::string two = kMaterial + std::string{"[[object]]\nmesh = 'a.obj'\nmaterial = 'm'\n"
                                                   "[[object]]\nmesh = 'b.obj'\nmaterial = 'm'\n"};
   const auto both = load(two);
@@ -144,6 +144,58 @@ TEST_F(SceneFiles, MeshesOfAllFormatsStandWhereTheyAreSaidTo) {
     ASSERT_TRUE(scene) << scene.error().message;
     EXPECT_FLOAT_EQ(rangeAhead(*scene), 2.5f) << name;
   }
+}
+
+TEST_F(SceneFiles, AMeshsUnitAndUpAreTurnedToTheScenes) {
+  write("mm.obj", "v -1000 -1000 -500\nv 1000 -1000 -500\nv 1000 1000 -500\nv -1000 1000 -500\nf 1 2 3 4\n");
+  const auto rangeBy = [&](const std::string& keys) {
+    const auto scene = load(kMaterial + ("[[object]]\nmesh = 'mm.obj'\nposition_m = [0, 0, 2]\nmaterial = 'm'\n" + keys));
+    EXPECT_TRUE(scene) << scene.error().message;
+    return scene ? rangeAhead(*scene) : 0.0f;
+  };
+  EXPECT_FLOAT_EQ(rangeBy("unit = 'mm'\n"), 1.5f);
+  EXPECT_FLOAT_EQ(rangeBy("unit = 'mm'\nup = 'y'\n"), 2.5f) << "turned about x by half a turn";
+  EXPECT_THAT(errorOf(kMaterial + std::string{"[[object]]\nshape = 'box'\nmaterial = 'm'\nup = 'z'\n"}),
+              HasSubstr("up has no meaning for this shape"));
+}
+
+TEST_F(SceneFiles, AMeshOfASizeThatCannotBeMeantIsNoted) {
+  write("mm.obj", "v -150 -150 1350\nv 150 -150 1350\nv 150 150 1350\nf 1 2 3\n");
+  const auto scene = loadMesh("mm.obj");
+  ASSERT_TRUE(scene);
+  EXPECT_THAT(scene->notes(), ::testing::ElementsAre(AllOf(HasSubstr("300 m wide"), HasSubstr("millimetres"))));
+  const auto in_mm = load(kMaterial + std::string{"[[object]]\nmesh = 'mm.obj'\nmaterial = 'm'\nunit = 'mm'\n"});
+  ASSERT_TRUE(in_mm);
+  EXPECT_THAT(in_mm->notes(), ::testing::IsEmpty());
+}
+
+TEST_F(SceneFiles, ACubeAtASurveyorsCoordinatesStandsWhereItIsSaidTo) {
+  std::string site;
+  for (const char* z : {"312.500", "312.800"}) {
+    for (const char* corner : {"432123.456 812345.678 ", "432123.756 812345.678 ", "432123.756 812345.978 ", "432123.456 812345.978 "})
+      site += "v " + std::string{corner} + z + "\n";
+  }
+  write("site.obj", site + "f 1 4 3 2\nf 5 6 7 8\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\nf 4 1 5 8\n");
+  const auto scene = load(kMaterial + std::string{"[[object]]\nmesh = 'site.obj'\nmaterial = 'm'\n"
+                                                  "position_m = [-432123.606, -812345.828, -311.0]\n"});
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_NEAR(rangeAhead(*scene), 1.5, 1e-6);
+}
+
+TEST_F(SceneFiles, AGltfFilesSurfacesAreMaterials) {
+  // One triangle as in the test above, of two surfaces: the second primitive is the first 1 m further.
+  write("two.gltf",
+        R"({"asset":{"version":"2.0"},"scene":0,"scenes":[{"nodes":[0,1]}],"nodes":[{"mesh":0,"translation":[0,0,0.5]},{"mesh":1,"translation":[0,0,1.5]}],
+"materials":[{"name":"paper","pbrMetallicRoughness":{"baseColorFactor":[0.9,0.9,0.9,1],"metallicFactor":0}},{"name":"steel","pbrMetallicRoughness":{"roughnessFactor":0.4}}],
+"meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]},{"primitives":[{"attributes":{"POSITION":0},"material":1}]}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":3,"type":"VEC3"}],"bufferViews":[{"buffer":0,"byteLength":36}],
+"buffers":[{"byteLength":36,"uri":"data:application/octet-stream;base64,AACAvwAAgL8AAAAAAABAQAAAgL8AAAAAAACAvwAAQEAAAAAA"}]})");
+  const auto scene = load("[[object]]\nmesh = 'two.gltf'\nposition_m = [0, 0, 2]\n");
+  ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_FLOAT_EQ(rangeAhead(*scene), 2.5f);
+  const Light light = trace(*scene, requestFor(1, 1, 1.0, {}));
+  EXPECT_NEAR(light.truth.albedo(0, 0), 0.9, 1e-6);
+  EXPECT_THAT(errorOf("[[object]]\nmesh = 'a.obj'\n"), HasSubstr("this object has no material"));
 }
 
 TEST_F(SceneFiles, TheIdCoversContentsAndNothingElse) {

@@ -14,6 +14,7 @@
 #include "sim/sensor/frame_assembly.h"
 #include "sim/sensor/lens_off_axis.h"
 #include "sim/tracer/missing_light.h"
+#include "sim/tracer/objects.h"
 #include "sim/tracer/scene.h"
 
 namespace toftwin::cli {
@@ -22,6 +23,9 @@ namespace {
 constexpr std::string_view kDefaultScene = drivers::simulator::kDefaultScene;
 constexpr const char* kDefaultSceneName = "default scene";
 
+/// Whoever renders by hand may have a mesh converted.
+const sim::SceneLoading kLoading{.stop = {}, .may_convert = true};
+
 Result<sim::SensorModel> loadCamera(const std::string& camera) {
   constexpr std::string_view kPreset = "preset:";  // as `toftwin info` names them
   if (std::filesystem::path{camera}.extension() == ".toml") return sim::SensorModel::load(camera);
@@ -29,11 +33,11 @@ Result<sim::SensorModel> loadCamera(const std::string& camera) {
 }
 
 Result<sim::Scene> loadScene(const std::string& scene) {
-  return scene.empty() ? sim::Scene::parse(kDefaultScene, kDefaultSceneName) : sim::Scene::load(scene);
+  return scene.empty() ? sim::Scene::parse(kDefaultScene, kDefaultSceneName) : sim::Scene::load(scene, sim::Band::Infrared, kLoading);
 }
 
 Result<sim::VisibleScene> loadVisibleScene(const std::string& scene) {
-  return scene.empty() ? sim::parseVisible(kDefaultScene, kDefaultSceneName) : sim::loadVisible(scene);
+  return scene.empty() ? sim::parseVisible(kDefaultScene, kDefaultSceneName) : sim::loadVisible(scene, kLoading);
 }
 
 bool isIn(PlaneKind kind, const std::vector<PlaneKind>& kinds) {
@@ -105,6 +109,10 @@ std::string namesOf(const std::vector<PlaneKind>& planes) {
   return names;
 }
 
+Transform<World, Camera> firstPose(const Trajectory& trajectory) {
+  return {trajectory.poses.front().rotation_wxyz, trajectory.poses.front().position_m};
+}
+
 /// Everything that the bytes of the output depend on.
 std::vector<Input> inputsOf(const RenderOptions& options, const FrameMaker& maker,
                             const std::string& scene_id, const Trajectory& trajectory,
@@ -169,9 +177,13 @@ Result<Job> jobOf(const RenderOptions& options) {
     fmt::print(stderr, "toftwin: {}: warning: {}\n", options.camera, *off_axis);
   const auto pose = options.pose.pose();
   if (!pose) return pose.error();
+  const auto warn = [&](const std::string& text) { fmt::print(stderr, "toftwin: {}: warning: {}\n", options.scene, text); };
+  for (const std::string& note : scene->notes()) warn(note);
   auto trajectory =
       options.trajectory.empty() ? Result<Trajectory>{Trajectory{}} : loadTrajectory(options.trajectory);
   if (!trajectory) return trajectory.error();
+  const auto nothing = sim::seesNothing(*scene, model->camera(), trajectory->poses.empty() ? *pose : firstPose(*trajectory));
+  if (nothing) warn(*nothing);
   const auto interval = intervalOf(*model, options.frame_interval_ms);
   if (!interval) return interval.error();
   const auto schedule = scheduleOf(*trajectory, options.frames, *interval);

@@ -75,7 +75,7 @@ Result<Exit> renderImages(const Frame& frame, const sim::SensorModel& model,
   if (!lenses) return Exit::Ok;
   const auto visible = scene.empty()
                            ? sim::parseVisible(drivers::simulator::kDefaultScene, "default scene")
-                           : sim::loadVisible(scene);
+                           : sim::loadVisible(scene, {.stop = {}, .may_convert = true});
   if (!visible) return visible.error();
   const auto color = sim::renderColor(*visible,
                                       {.lenses = *lenses,
