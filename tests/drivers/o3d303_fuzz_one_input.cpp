@@ -66,6 +66,20 @@ void readMessages(std::span<const std::byte> bytes) {
   }
 }
 
+void readLines(std::span<const std::byte> bytes) {
+  for (const PcicVersion version : {PcicVersion::V1, PcicVersion::V2, PcicVersion::V4}) {
+    PcicReader reader{1 << 10};
+    reader.setVersion(version);
+    reader.feed(bytes);
+    while (true) {
+      const auto message = reader.next();
+      if (!message || !*message) break;
+      demand((*message)->content.size() <= 1 << 10);
+      demand((*message)->ticket.size() == (version == PcicVersion::V2 ? 4U : 0U));
+    }
+  }
+}
+
 void readTexts(std::string_view text) {
   if (const auto schema = readSchema(text)) {
     for (const SchemaElement& element : *schema) demand(element.id.size() <= text.size());
@@ -86,6 +100,7 @@ void readTexts(std::string_view text) {
 
 void fuzzOneInput(std::span<const std::byte> bytes) {
   readMessages(bytes);
+  readLines(bytes);
   readFrame(bytes);
   readTexts(textOf(bytes));
 }

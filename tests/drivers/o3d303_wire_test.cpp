@@ -58,6 +58,25 @@ TEST(Pcic, MessagesComeOutHoweverTheBytesAreCut) {
   }
 }
 
+TEST(Pcic, OtherVersionsAreLines) {
+  EXPECT_EQ(textOf(encodePcic("1001", "*", PcicVersion::V1)), "*\r\n");
+  EXPECT_EQ(textOf(encodePcic("1001", "*", PcicVersion::V2)), "1001*\r\n");
+  EXPECT_EQ(textOf(encodePcic("1001", "*", PcicVersion::V4)), "L000000003\r\n*\r\n");
+  PcicReader reader{8};
+  reader.setVersion(PcicVersion::V2);
+  reader.feed(bytesOf("1001t\r\n1002T?\r"));
+  const auto first = reader.next();
+  ASSERT_TRUE(first.ok() && *first);
+  EXPECT_EQ((*first)->ticket, "1001");
+  EXPECT_EQ(textOf((*first)->content), "t");
+  EXPECT_FALSE(reader.next()->has_value()) << "the line has no end yet";
+  reader.setVersion(PcicVersion::V1);
+  reader.feed(bytesOf("\n"));
+  EXPECT_EQ(textOf((*reader.next())->content), "1002T?");
+  reader.feed(bytesOf("nine bytes"));
+  EXPECT_FALSE(reader.next().ok()) << "longer than asked for";
+}
+
 TEST(Pcic, WhatIsNoMessageIsToldApart) {
   for (const char* bad : {"HTTP/1.1 200 OK\r\n\r\n", "0000L00000000a\r\n0000*\r\n",
                           "0000L000000005\r\n0000*\r\n", "0000L000009999\r\n0000*\r\n",

@@ -99,7 +99,8 @@ Schema withoutMarkers(Schema schema) {
 
 Command readCommand(std::string_view content) {
   using enum Command::Kind;
-  constexpr std::array<std::pair<std::string_view, Command::Kind>, 6> kWords{{{"C?", AskSchema},
+  constexpr std::array<std::pair<std::string_view, Command::Kind>, 7> kWords{{{"C?", AskSchema},
+                                                                              {"V?", AskVersion},
                                                                               {"t", Trigger},
                                                                               {"T?", TriggerAndWait},
                                                                               {"E?", AskError},

@@ -17,21 +17,22 @@ struct Output {
 /// A PCIC command as the camera understands it. [ifm, operating instructions O3D303, process interface]
 struct Command {
   enum class Kind {
-    SetSchema,        ///< "c", nine digits, JSON
-    AskSchema,        ///< "C?"
-    SetOutput,        ///< "p" and a hexadecimal digit
-    Trigger,          ///< "t"
-    TriggerAndWait,   ///< "T?"
-    AskError,         ///< "E?"
-    AskImage,         ///< "I", two digits, "?"
-    AskConnection,    ///< "L?"
-    AskCommands,      ///< "H?"
-    Activate,         ///< "a", two digits: an application
-    SetVersion,       ///< "v", two digits
-    SetWire,          ///< "o", two digits, 0 or 1: an output of the camera
-    AskWire,          ///< "O", two digits, "?"
-    Refused,          ///< one of these with what cannot be
-    Other             ///< for the device, or not known, or of another length
+    SetSchema,       ///< "c", nine digits, JSON
+    AskSchema,       ///< "C?"
+    SetOutput,       ///< "p" and a hexadecimal digit
+    Trigger,         ///< "t"
+    TriggerAndWait,  ///< "T?"
+    AskError,        ///< "E?"
+    AskImage,        ///< "I", two digits, "?"
+    AskConnection,   ///< "L?"
+    AskCommands,     ///< "H?"
+    Activate,        ///< "a", two digits: an application
+    SetVersion,      ///< "v", two digits
+    AskVersion,      ///< "V?"
+    SetWire,         ///< "o", two digits, 0 or 1: an output of the camera
+    AskWire,         ///< "O", two digits, "?"
+    Refused,         ///< one of these with what cannot be
+    Other            ///< for the device, or not known, or of another length
   };
   Kind kind = Kind::Other;
   toftwin::o3d303::Schema schema{};

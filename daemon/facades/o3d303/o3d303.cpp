@@ -347,7 +347,6 @@ class O3d303Facade final : public Facade {
 
   /// The PCIC commands that ask.
   std::string tellOfDevice(std::string_view command) {
-    if (command == "V?") return "03 01 04";  // the version in use, the oldest and the newest
     if (command == "G?") {
       const auto& all = device_->parameters();
       const auto& network = device_->network();

@@ -11,7 +11,7 @@ using boost::system::error_code;
 using toftwin::o3d303::Bytes;
 using toftwin::o3d303::Schema;
 
-constexpr int kVersion = 3;                         ///< of the protocol, the only one that is spoken
+constexpr int kOldest = 1, kNewest = 4;             ///< versions of the protocol
 constexpr std::chrono::seconds kFramePatience{10};  ///< with a frame that was triggered
 
 }  // namespace
@@ -45,8 +45,10 @@ void PcicServer::Connection::obey(const toftwin::o3d303::PcicMessage& message) {
     case Command::Kind::Activate:
       return activate(message.ticket, command.number);
     case Command::Kind::SetVersion:
+      return setVersion(message.ticket, command.number);
+    case Command::Kind::AskVersion:
       return reply(message.ticket,
-                   command.number == kVersion ? toftwin::o3d303::kDone : toftwin::o3d303::kRefused);
+                   fmt::format("{:02} {:02} {:02}", static_cast<int>(version_), kOldest, kNewest));
     case Command::Kind::SetWire:
     case Command::Kind::AskWire:
       return wire(message.ticket, command);
@@ -112,6 +114,14 @@ void PcicServer::Connection::wire(const std::string& ticket, const Command& comm
     return reply(ticket, fmt::format("{:02}{}", command.number, is_high ? 1 : 0));
   is_high = command.is_high;
   reply(ticket, toftwin::o3d303::kDone);
+}
+
+/// The answer is of the version in which it was asked.
+void PcicServer::Connection::setVersion(const std::string& ticket, int version) {
+  if (version < kOldest || version > kNewest) return reply(ticket, toftwin::o3d303::kRefused);
+  reply(ticket, toftwin::o3d303::kDone);
+  version_ = static_cast<toftwin::o3d303::PcicVersion>(version);
+  reader_.setVersion(version_);
 }
 
 }  // namespace toftwin::daemon::o3d303

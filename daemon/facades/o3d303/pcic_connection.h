@@ -47,6 +47,7 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
   [[nodiscard]] Schema schema() const { return schema_ ? *schema_ : server_.hooks_.default_schema(); }
   [[nodiscard]] bool takes(unsigned output) const { return (output_ & output) != 0; }
   [[nodiscard]] int number() const { return number_; }
+  [[nodiscard]] toftwin::o3d303::PcicVersion version() const { return version_; }
   /// Whether the frame was waited for, and is the answer.
   bool answerWith(const toftwin::o3d303::CameraFrame& frame) {
     if (!waiting_ticket_) return false;
@@ -130,11 +131,12 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
   void replyImage(const std::string& ticket, int number);
   void activate(const std::string& ticket, int index);
   void wire(const std::string& ticket, const Command& command);
+  void setVersion(const std::string& ticket, int version);
 
   void reply(std::string_view ticket, char answer) { reply(ticket, std::string_view{&answer, 1}); }
   void reply(std::string_view ticket, std::string_view answer) {
     if (!socket_.is_open()) return;
-    send(std::make_shared<const Bytes>(toftwin::o3d303::encodePcic(ticket, answer)), false);
+    send(std::make_shared<const Bytes>(toftwin::o3d303::encodePcic(ticket, answer, version_)), false);
   }
   void replyWith(std::string_view ticket, const Bytes& answer) {
     reply(ticket, toftwin::o3d303::textOf(answer));
@@ -153,6 +155,7 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
   PcicServer& server_;
   const std::shared_ptr<bool> alive_;
   const int number_;
+  toftwin::o3d303::PcicVersion version_ = toftwin::o3d303::PcicVersion::V3;
   tcp::socket socket_;
   boost::asio::steady_timer ends_, waits_;
   std::optional<std::string> waiting_ticket_;  ///< of "T?"

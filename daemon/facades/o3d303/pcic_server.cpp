@@ -63,8 +63,12 @@ void PcicServer::remove(const std::shared_ptr<Connection>& connection) {
 }
 
 bool PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage& damage) {
-  using SharedBytes = Connection::SharedBytes;
-  std::vector<std::pair<Schema, SharedBytes>> made;
+  struct Made {
+    Schema schema;
+    toftwin::o3d303::PcicVersion version;
+    Connection::SharedBytes bytes;
+  };
+  std::vector<Made> made;
   const auto all = connections_;  // sending may close one
   bool has_left = false;
   for (const auto& connection : all) {
@@ -74,18 +78,20 @@ bool PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage
     }
     const auto schema = connection->wanted();
     if (!schema) continue;
-    auto found = std::ranges::find(made, *schema, &std::pair<Schema, SharedBytes>::first);
+    const auto version = connection->version();
+    auto found = std::ranges::find_if(
+        made, [&](const Made& one) { return one.schema == *schema && one.version == version; });
     if (found == made.end()) {
       const auto content = writeFrameContent(*schema, frame);
       if (!content) continue;  // no schema comes here that was not checked
       const std::span<const std::byte> bytes{*content};
-      Bytes message = toftwin::o3d303::encodePcic(toftwin::o3d303::kFrameTicket, bytes);
+      Bytes message = toftwin::o3d303::encodePcic(toftwin::o3d303::kFrameTicket, bytes, version);
       damage.corrupt(message);
       if (damage.is_cut) message.resize(message.size() / 2);
-      made.emplace_back(*schema, std::make_shared<const Bytes>(std::move(message)));
+      made.push_back({*schema, version, std::make_shared<const Bytes>(std::move(message))});
       found = made.end() - 1;
     }
-    has_left |= damage.is_cut ? connection->endWith(found->second) : connection->send(found->second, true);
+    has_left |= damage.is_cut ? connection->endWith(found->bytes) : connection->send(found->bytes, true);
   }
   return has_left;
 }
@@ -100,10 +106,12 @@ void PcicServer::tellNotification(int code, std::string_view json) {
 }
 
 void PcicServer::tell(std::string_view ticket, unsigned output, std::string_view text) {
-  const auto bytes = std::make_shared<const Bytes>(toftwin::o3d303::encodePcic(ticket, text));
   const auto all = connections_;
   for (const auto& connection : all) {
-    if (connection->takes(output)) connection->send(bytes, false);
+    if (!connection->takes(output)) continue;
+    connection->send(
+        std::make_shared<const Bytes>(toftwin::o3d303::encodePcic(ticket, text, connection->version())),
+        false);
   }
 }
 

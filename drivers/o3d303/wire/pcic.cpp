@@ -34,18 +34,23 @@ std::optional<std::size_t> digitsAsNumber(std::string_view digits) {
 
 }  // namespace
 
-Bytes encodePcic(std::string_view ticket, std::span<const std::byte> content) {
+Bytes encodePcic(std::string_view ticket, std::span<const std::byte> content, PcicVersion version) {
   Bytes message;
   message.reserve(kFirstLine + kTicket + content.size() + kLineEnd.size());
-  appendText(message, fmt::format("{}L{:09}\r\n{}", ticket,
-                                  kTicket + content.size() + kLineEnd.size(), ticket));
+  const bool has_ticket = version == PcicVersion::V2 || version == PcicVersion::V3;
+  const std::string_view shown = has_ticket ? ticket : std::string_view{};
+  if (version == PcicVersion::V3 || version == PcicVersion::V4) {
+    const std::size_t length = shown.size() + content.size() + kLineEnd.size();
+    appendText(message, fmt::format("{}L{:09}{}", shown, length, kLineEnd));
+  }
+  appendText(message, shown);
   message.insert(message.end(), content.begin(), content.end());
   appendText(message, kLineEnd);
   return message;
 }
 
-Bytes encodePcic(std::string_view ticket, std::string_view content) {
-  return encodePcic(ticket, std::as_bytes(std::span{content}));
+Bytes encodePcic(std::string_view ticket, std::string_view content, PcicVersion version) {
+  return encodePcic(ticket, std::as_bytes(std::span{content}), version);
 }
 
 std::string schemaCommand(std::string_view schema_json) {
@@ -73,7 +78,29 @@ void PcicReader::feed(std::span<const std::byte> bytes) {
   end_ += bytes.size();
 }
 
+/// A message that is a line, with or without a ticket.
+Result<std::optional<PcicMessage>> PcicReader::nextLine() {
+  const std::string_view bytes = textOf(std::span{buffer_}.subspan(begin_, end_ - begin_));
+  const std::size_t size = bytes.find(kLineEnd);
+  if (std::min(size, bytes.size()) > most_bytes_) {
+    return Error{Error::Code::Malformed, fmt::format("PCIC: a line of more than {} bytes", most_bytes_)};
+  }
+  if (size == std::string_view::npos) return std::optional<PcicMessage>{};
+  std::string_view content = bytes.substr(0, size);
+  PcicMessage message;
+  if (version_ == PcicVersion::V2) {
+    if (content.size() < kTicket || !areDigits(content.substr(0, kTicket)))
+      return Error{Error::Code::Malformed, fmt::format("PCIC: \"{}\" has no ticket", printable(content))};
+    message.ticket = content.substr(0, kTicket);
+    content.remove_prefix(kTicket);
+  }
+  appendText(message.content, content);
+  begin_ += size + kLineEnd.size();
+  return std::optional{std::move(message)};
+}
+
 Result<std::optional<PcicMessage>> PcicReader::next() {
+  if (version_ != PcicVersion::V3) return nextLine();
   const std::span<const std::byte> bytes = std::span{buffer_}.subspan(begin_, end_ - begin_);
   if (bytes.size() < kFirstLine) return std::optional<PcicMessage>{};
   const std::string_view line = textOf(bytes.first(kFirstLine));

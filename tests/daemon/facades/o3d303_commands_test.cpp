@@ -8,6 +8,9 @@
 #include <cstring>
 #include <string>
 
+#include <boost/asio/read.hpp>
+#include <boost/asio/write.hpp>
+
 #include "facade_testing.h"
 #include "o3d303_client.h"
 
@@ -131,9 +134,29 @@ TEST_F(O3d303Commands, EveryCommandOfTheListIsKnown) {
   PcicClient one{camera().pcicPort()};
   EXPECT_THAT(one.command("H?"), StartsWith("H? - "));
   EXPECT_EQ(one.command("v03"), "*");
-  EXPECT_EQ(one.command("v01"), "!") << "another version is not spoken";
+  EXPECT_EQ(one.command("v05"), "!") << "there is none";
   EXPECT_EQ(one.command("V?"), "03 01 04");
   EXPECT_EQ(one.command("D?"), "?");
+}
+
+TEST_F(O3d303Commands, AConnectionCanSpeakAnotherVersion) {
+  startO3d303(kPattern);
+  boost::asio::io_context io;
+  boost::asio::ip::tcp::socket terminal{io};
+  terminal.connect({boost::asio::ip::address_v4::loopback(), camera().pcicPort()});
+  const auto exchange = [&](std::string_view bytes, std::string_view answer) {
+    boost::asio::write(terminal, boost::asio::buffer(bytes.data(), bytes.size()));
+    std::string came(answer.size(), '\0');
+    boost::asio::read(terminal, boost::asio::buffer(came));
+    EXPECT_EQ(came, answer);
+  };
+  exchange("1000L000000008\r\n1000p0\r\n", "1000L000000007\r\n1000*\r\n");
+  exchange("1000L000000009\r\n1000v02\r\n", "1000L000000007\r\n1000*\r\n");
+  exchange("1234V?\r\n", "123402 01 04\r\n");
+  exchange("1234v01\r\n", "1234*\r\n");
+  exchange("V?\r\n", "01 01 04\r\n");
+  exchange("v04\r\n", "*\r\n");
+  exchange("V?\r\n", "L000000010\r\n04 01 04\r\n");
 }
 
 TEST_F(O3d303Commands, TheSchemaComesBackAsItWasWritten) {

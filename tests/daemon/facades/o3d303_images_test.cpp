@@ -286,6 +286,67 @@ TEST_F(O3d303Images, ComeAsUnevenlyAsARealCamerasDid) {
   EXPECT_LT(least_late_ms, 10.0) << "some come in time on any machine";
 }
 
+/// The nearest surfaces fill a small well in a millisecond, and none in a large one.
+TEST_F(O3d303Images, AnAutomaticExposureSetsTheSimulatedCameras) {
+  startO3d303(kSmallSim);
+  auto native = client();
+  ASSERT_TRUE(native.setParameter("cam", "saturation.full_well_electrons", 18'000.0).ok());
+  auto rpc = camera();
+  rpc.edit();
+  rpc.call(rpc.imager(), "setParameter", {"ContinuousAutoExposure", "true"});
+  rpc.call(rpc.session("edit/application/"), "save", {});
+  rpc.endSession();
+  const auto exposure_us = [&] {
+    const auto details = native.describe("cam");
+    for (const Parameter& one : details->parameters) {
+      if (one.name == "exposure_us") return one.value.value_or(0.0);
+    }
+    return 0.0;
+  };
+  PcicClient watches{rpc.pcicPort()};
+  const auto watchUntil = [&](const auto& isThere) {
+    for (int i = 0; i < 200 && !isThere(); ++i) watches.frame();
+    return isThere();
+  };
+  EXPECT_TRUE(watchUntil([&] { return exposure_us() < 900.0; })) << exposure_us();
+  ASSERT_TRUE(native.setParameter("cam", "saturation.full_well_electrons", 1e7).ok());
+  EXPECT_TRUE(watchUntil([&] { return exposure_us() > 1000.0; })) << exposure_us();
+}
+
+TEST_F(O3d303Images, ResolutionZeroOfAFineSourceHasHalfItsRowsAndColumns) {
+  startO3d303("driver = 'pattern'\nwidth = 352\nheight = 264\nframe_rate_hz = 20\n");
+  auto rpc = camera();
+  PcicClient watches{rpc.pcicPort()};
+  EXPECT_EQ(watches.frame().chunks.at(0).header.width, 352u);
+  rpc.edit();
+  rpc.call(rpc.imager(), "setParameter", {"Resolution", "0"});
+  rpc.call(rpc.session("edit/application/"), "save", {});
+  rpc.endSession();
+  EXPECT_TRUE(eventually([&] {
+    const auto frame = watches.frame();
+    return frame.chunks.at(0).header.width == 176u && frame.chunks.at(0).header.height == 132u;
+  }));
+}
+
+TEST_F(O3d303Images, OurDriverFindsTheLensWhereverAClientTurnsTheCamera) {
+  startO3d303(kSmallSim);
+  auto rpc = camera();
+  rpc.edit();
+  for (const auto& [name, value] :
+       {std::pair{"RotX", "25"}, {"RotY", "-40"}, {"RotZ", "130"}, {"TransX", "100"}}) {
+    rpc.call(rpc.session("edit/device/"), "setParameter", {fmt::format("ExtrinsicCalib{}", name), value});
+  }
+  rpc.call(rpc.session("edit/device/"), "save", {});
+  rpc.endSession();
+  const auto driver = openDriver();
+  ASSERT_TRUE(driver.ok()) << driver.error().message;
+  const CameraInfo seen = (*driver)->info().camera, own = client().describe("cam")->camera;
+  EXPECT_NEAR(seen.fx, own.fx, 0.01);
+  EXPECT_NEAR(seen.fy, own.fy, 0.01);
+  EXPECT_NEAR(seen.cx, own.cx, 0.01);
+  EXPECT_NEAR(seen.cy, own.cy, 0.01);
+}
+
 TEST_F(O3d303Images, ASetClockIsThatOfTheFrames) {
   startO3d303(kPattern);
   auto rpc = camera();
