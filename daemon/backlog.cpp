@@ -3,6 +3,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace toftwin::daemon {
@@ -42,6 +43,42 @@ wire::Body PreparedFrame::summedBody() const {
 
 std::uint64_t PreparedFrame::heldBytes() const { return body.bytes + kFrameOverhead; }
 
+std::vector<Piece> PreparedFrame::pieces() const {
+  std::vector<Piece> pieces;
+  pieces.reserve(1 + frame.planes.size());
+  std::uint64_t beside = heldBytes();
+  for (const Plane& plane : frame.planes) {
+    pieces.push_back({plane.data.bytes().data(), plane.data.size()});
+    beside -= std::min<std::uint64_t>(beside, plane.data.size());
+  }
+  pieces.push_back({this, beside});
+  return pieces;
+}
+
+Hold::Hold(Hold&& other) noexcept
+    : account_(std::move(other.account_)), frame_(std::move(other.frame_)), pieces_(std::move(other.pieces_)) {}
+
+Hold& Hold::operator=(Hold&& other) noexcept {
+  std::swap(account_, other.account_);
+  std::swap(frame_, other.frame_);
+  std::swap(pieces_, other.pieces_);
+  return *this;
+}
+
+Hold::~Hold() {
+  if (account_) account_->release(pieces_);
+}
+
+std::optional<Hold> Hold::of(const std::shared_ptr<Account>& account, const PreparedFramePtr& frame) {
+  Hold hold;
+  if (!account) return hold;
+  hold.pieces_ = frame->pieces();
+  if (!account->hold(hold.pieces_)) return std::nullopt;
+  hold.account_ = account;
+  hold.frame_ = frame;
+  return hold;
+}
+
 Result<> Backlog::checkHolds(const Settings& settings, std::uint64_t plane_bytes) {
   const std::uint64_t held = plane_bytes + kFrameOverhead;
   const bool fits = settings.policy != wire::Policy::Lossless || held <= settings.byte_limit;
@@ -50,23 +87,24 @@ Result<> Backlog::checkHolds(const Settings& settings, std::uint64_t plane_bytes
 
 Result<Share> Backlog::reserve(const Settings& settings, std::uint64_t plane_bytes) {
   const std::uint64_t bytes = 2 * (plane_bytes + kFrameOverhead);
-  if (auto share = Share::of(settings.budget, bytes)) return *std::move(share);
+  if (auto share = Share::of(settings.account, bytes)) return *std::move(share);
   return Error{Error::Code::Busy,
-               fmt::format("all subscriptions and recordings together may hold {} MB (limits.backlog_mb), of "
-                           "which {} are taken, and this one needs {} at least: end others, ask for less, or "
-                           "raise the limit",
-                           settings.budget->limit() >> 20, settings.budget->used() >> 20,
-                           (bytes + (1u << 20) - 1) >> 20)};
+               fmt::format("a subscription or recording needs room for two of its frames, {} MB, but {}: end others, "
+                           "ask for less, or raise the limit",
+                           (bytes + (1u << 20) - 1) >> 20, settings.account->whyNot(bytes))};
 }
 
-std::optional<Share> Backlog::another(std::uint64_t plane_bytes) const {
-  return Share::of(settings_.budget, plane_bytes + kFrameOverhead);
+std::optional<Hold> Backlog::another(const PreparedFramePtr& frame) const {
+  return Hold::of(settings_.account, frame);
+}
+
+PreparedFramePtr Backlog::peek() const {
+  const std::scoped_lock lock{mutex_};
+  return frames_.empty() ? nullptr : frames_.front().frame;
 }
 
 Backlog::Backlog(Settings settings, std::function<void()> wake)
-    : settings_(std::move(settings)),
-      wake_(std::move(wake)),
-      counted_(*Share::of(settings_.budget, 0)) {}
+    : settings_(std::move(settings)), wake_(std::move(wake)) {}
 
 bool Backlog::wants(SteadyTime now) {
   const std::scoped_lock lock{mutex_};
@@ -90,14 +128,14 @@ void Backlog::push(PreparedFramePtr frame) {
     const bool was_empty = frames_.empty();
     if (settings_.policy == wire::Policy::Lossless &&
         bytes_ + frame->heldBytes() > settings_.byte_limit) {
-      end_ = frames_.empty() ? neverFits(frame->heldBytes(), settings_.byte_limit) : overrun();
+      endWithOverrun(frames_.empty() ? neverFits(frame->heldBytes(), settings_.byte_limit) : overrun());
     } else {
       bytes_ += frame->heldBytes();
-      frames_.push_back(std::move(frame));
+      frames_.push_back({std::move(frame)});
       while (frames_.size() > 1 && isTooMuch()) dropOldest();
-      while (!account()) makeRoom();
+      while (!end_ && !countNewest()) makeRoom();
     }
-    if (!was_empty) return;
+    if (!was_empty && !(end_ && frames_.empty())) return;
   }
   wake_();
 }
@@ -109,22 +147,32 @@ Error Backlog::overrun() const {
                       frames_.size(), bytes_ >> 20)};
 }
 
-/// Counts all that waits but the oldest against the budget; false if that is too much for it.
-bool Backlog::account() {
-  const std::uint64_t oldest = frames_.empty() ? 0 : frames_.front()->heldBytes();
-  return counted_.resize(bytes_ - oldest);
+/// Counts the newest, unless it is the only one; false if that is more than the payer may hold.
+bool Backlog::countNewest() {
+  if (frames_.size() < 2) return true;
+  auto hold = Hold::of(settings_.account, frames_.back().frame);
+  if (!hold) return false;
+  frames_.back().counted = *std::move(hold);
+  return true;
 }
 
-/// The daemon holds as much as it may.
+/// The payer holds as much as it may.
 void Backlog::makeRoom() {
   if (settings_.policy != wire::Policy::Lossless) return dropOldest();
-  bytes_ -= frames_.back()->heldBytes();
+  const std::uint64_t bytes = frames_.back().frame->heldBytes();
+  bytes_ -= bytes;
   frames_.pop_back();
-  end_ = Error{Error::Code::Overrun,
-               fmt::format("{} frames ({} MB) wait for this lossless subscriber, and all that wait in "
-                           "the daemon may have {} MB (limits.backlog_mb): read faster, ask for less, or "
-                           "raise the limit",
-                           frames_.size(), bytes_ >> 20, settings_.budget->limit() >> 20)};
+  endWithOverrun({Error::Code::Overrun,
+                  fmt::format("{} frames ({} MB) wait for this lossless subscriber, and {}: read faster, ask for less, "
+                              "or raise the limit",
+                              frames_.size(), bytes_ >> 20, settings_.account->whyNot(bytes))});
+}
+
+void Backlog::endWithOverrun(Error why) {
+  end_ = std::move(why);
+  if (settings_.keeps_at_overrun) return;
+  frames_.clear();
+  bytes_ = 0;
 }
 
 bool Backlog::isTooMuch() const {
@@ -141,9 +189,22 @@ bool Backlog::isTooMuch() const {
 }
 
 void Backlog::dropOldest() {
-  bytes_ -= frames_.front()->heldBytes();
-  frames_.pop_front();
+  popOldest();
   ++dropped_;
+}
+
+/// The next becomes the oldest, which has its reserved room.
+PreparedFramePtr Backlog::popOldest() {
+  PreparedFramePtr frame = std::move(frames_.front().frame);
+  bytes_ -= frame->heldBytes();
+  frames_.pop_front();
+  if (!frames_.empty()) frames_.front().counted = Hold{};
+  return frame;
+}
+
+void Backlog::miss(std::uint64_t frames) {
+  const std::scoped_lock lock{mutex_};
+  dropped_ += frames;
 }
 
 void Backlog::end(Error reason) {
@@ -161,6 +222,11 @@ bool Backlog::hasEnded() const {
   return end_.has_value();
 }
 
+bool Backlog::isOver() const {
+  const std::scoped_lock lock{mutex_};
+  return end_.has_value() && frames_.empty();
+}
+
 std::uint64_t Backlog::heldBytes() const {
   const std::scoped_lock lock{mutex_};
   return bytes_;
@@ -169,11 +235,7 @@ std::uint64_t Backlog::heldBytes() const {
 std::optional<Backlog::Item> Backlog::take() {
   const std::scoped_lock lock{mutex_};
   if (!frames_.empty()) {
-    Delivery delivery{std::move(frames_.front()), std::exchange(dropped_, 0)};
-    frames_.pop_front();
-    bytes_ -= delivery.frame->heldBytes();
-    static_cast<void>(account());  // less than before
-    return delivery;
+    return Delivery{popOldest(), std::exchange(dropped_, 0)};
   }
   if (!end_ || end_taken_) return std::nullopt;
   end_taken_ = true;

@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "daemon/networks.h"
 #include "daemon/thrown.h"
 #include "protocol/settings/describe.h"
 #include "protocol/settings/endable.h"
@@ -99,9 +100,23 @@ Result<std::unique_ptr<drivers::Source>> openGuarded(const drivers::Driver& driv
   }
 }
 
+/// Nothing if it is not recorded on and on; what is wrong goes to the table.
+std::optional<RecordPlan> readRecord(settings::Table& table, const RecordKeys& keys, const std::filesystem::path& folder) {
+  if (keys.file.empty()) {
+    if (!keys.split.empty() || !keys.keep.empty()) table.complain("record", "has no file");
+    return std::nullopt;
+  }
+  auto plan = readRecordPlan(keys, folder);
+  if (plan) return *std::move(plan);
+  table.complain("record", plan.error().message);
+  return std::nullopt;
+}
+
 ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driver> drivers,
-                            const std::vector<std::string>& running, std::set<std::string>& names) {
+                            const std::vector<std::string>& running, std::set<std::string>& names,
+                            const std::filesystem::path& recording_folder) {
   SourceKeys keys = readSourceKeys(table, drivers, names);
+  auto record = readRecord(table, keys.record, recording_folder);
   const drivers::Driver* driver = findDriver(drivers, keys.driver);
   // Relative paths in the table start at its file's folder, which therefore counts too. The stamps
   // come before the opening: a file that changes in between is opened again rather than missed.
@@ -110,6 +125,7 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
       table.resolve("").string() + "\n" + table.canonicalText() + "\n" + stampsOf(table, log);
   const bool is_as_before = std::ranges::find(running, fingerprint) != running.end();
   ConfiguredSource source{std::move(keys), driver, table, nullptr, std::move(fingerprint), is_as_before};
+  source.record = std::move(record);
   if (driver == nullptr || settings::EndableReading::now().stop_requested()) return source;
   if (is_as_before) {
     table.acceptAll();
@@ -137,6 +153,7 @@ FacadeKeys readFacadeKeys(settings::Table& table, const std::set<std::string>& s
                        : "source is missing: it must be the name of a [[source]]");
   }
   const ListenKeys listen{.address = keys.address, .allow_remote = keys.allow_remote};
+  if (auto allowed = Networks::read(keys.allow); !allowed) table.complain("allow", allowed.error().message);
   if (keys.address.empty()) {
     table.complain("address", "is empty, but a facade must listen somewhere, such as on 127.0.0.1");
   } else if (auto checked = checkListen(listen); !checked) {
@@ -177,6 +194,44 @@ std::filesystem::path recordingFolder(const DaemonKeys& keys, const settings::Ta
   return state == nullptr ? "" : state;
 }
 
+/// Null if there is no certificate, or if something is wrong with it, which goes to the table of [listen].
+std::shared_ptr<const transport::TlsContext> readTls(const settings::Table& table, settings::Table& listen,
+                                                     const ListenKeys& keys) {
+  if (keys.certificate.empty() != keys.key.empty()) {
+    listen.complain(keys.key.empty() ? "certificate" : "key", "stands alone: certificate and key belong together");
+    return nullptr;
+  }
+  if (keys.certificate.empty()) return nullptr;
+  const auto at = [&](const std::string& file) { return file.empty() ? std::filesystem::path{} : table.resolve(file); };
+  auto made = transport::TlsContext::forServer({at(keys.certificate), at(keys.key), at(keys.client_authorities)}, false);
+  if (made) return *std::move(made);
+  listen.complain("certificate", made.error().message);
+  return nullptr;
+}
+
+/// Other machines are let in encrypted and by roles, or by the word for it.
+Result<> checkRemote(const ListenKeys& listen, const RoleKeys& roles) {
+  const ListenKeys only_here{.address = listen.address};
+  if (listen.insecure || listen.address.empty() || checkListen(only_here) || !checkListen(listen)) return {};
+  const bool has_roles = !(roles.view.empty() && roles.control.empty() && roles.record.empty() && roles.admin.empty());
+  if (!listen.certificate.empty() && has_roles) return {};
+  return Error{Error::Code::InvalidArgument,
+               fmt::format("= true lets other machines in, but there {}: `toftwin certificate` makes listen.certificate and "
+                           "listen.key, [roles] say who may do what. Or set insecure = true if you trust that whole network",
+                           listen.certificate.empty() ? has_roles ? "is no certificate, so that anybody listens"
+                                                                  : "are no certificate and no roles"
+                                                      : "are no roles, so that everybody may do all")};
+}
+
+std::shared_ptr<const Access> readAccess(settings::Table& table, const RoleKeys& keys) {
+  auto roles = table.table("roles");
+  if (!roles) return std::make_shared<Access>();
+  roles->acceptAll();  // read above
+  return std::make_shared<Access>(Access::read(
+      keys, [&](const std::string& path) { return table.resolve(path); },
+      [&](const std::string& key, const std::string& what) { roles->complain(key, what); }));
+}
+
 Result<Config> readConfig(settings::Table& table, std::span<const drivers::Driver> drivers,
                           const std::vector<std::string>& running, std::span<const FacadeKind> facades) {
   Config config;
@@ -185,21 +240,26 @@ Result<Config> readConfig(settings::Table& table, std::span<const drivers::Drive
     listen->acceptAll();  // read above
     if (auto checked = checkListen(config.keys.listen); !checked)
       listen->complain("address", checked.error().message);
+    config.tls = readTls(table, *listen, config.keys.listen);
+    if (auto checked = checkRemote(config.keys.listen, config.keys.roles); !checked)
+      listen->complain("allow_remote", checked.error().message);
   }
+  config.recording_folder = recordingFolder(config.keys, table);
+  if (!config.keys.audit_log.empty()) config.audit_log = table.resolve(config.keys.audit_log).lexically_normal();
+  config.access = readAccess(table, config.keys.roles);
   // As all paths in the file; --socket is the shell's, and stays.
   std::string& socket = config.keys.listen.socket;
   if (!socket.empty() && socket != "auto")
     socket = table.resolve(socket).lexically_normal().string();
   std::set<std::string> names;
   for (settings::Table& below : table.tables("source")) {
-    config.sources.push_back(readSource(below, drivers, running, names));
+    config.sources.push_back(readSource(below, drivers, running, names, config.recording_folder));
   }
   for (settings::Table& below : table.tables("facade")) {
     config.facades.push_back(readFacade(below, facades, names));
   }
   if (settings::EndableReading::now().stop_requested()) return Error{Error::Code::Stopped, "asked to stop while reading the configuration"};
   if (auto checked = table.check(); !checked) return checked.error();
-  config.recording_folder = recordingFolder(config.keys, table);
   return config;
 }
 
@@ -240,7 +300,7 @@ Result<> checkListen(const ListenKeys& listen) {
       Error::Code::InvalidArgument,
       fmt::format("= \"{}\" can be reached from other machines, and there is no password: "
                   "everyone there could see all cameras and steer them. Set allow_remote = true "
-                  "if you trust that whole network, or use 127.0.0.1",
+                  "if that is meant, or use 127.0.0.1",
                   address)};
 }
 

@@ -22,12 +22,6 @@ using transport::Socket;
 constexpr std::size_t kMostOwed = 64;  // answers; a client that asks on must read some first
 constexpr std::chrono::milliseconds kFarewell{1000};
 
-Session::Options sessionOptions(const Connection::Options& options, bool is_local) {
-  Session::Options session{.subscriptions = options.subscriptions, .features = {}};
-  if (is_local) session.features.emplace_back(transport::kMemfdFeature);
-  return session;
-}
-
 /// An answer that the protocol cannot carry (a driver's name that is too long, an interval that is not a
 /// number) becomes a Failure that says so.
 wire::Encoded encodeOrFailure(const wire::Message& answer) {
@@ -60,7 +54,7 @@ void Connection::guarded(Work work) noexcept {
   } catch (...) {
     try {
       const Error why = thrownError("serving this client");
-      logging::error("{}: {}; closing", name_, why.message);
+      hooks_.log->warn(peer_.name(), "{}: {}; closing", name_, why.message);
       return dismiss(why);
     } catch (...) {
       close();
@@ -68,26 +62,54 @@ void Connection::guarded(Work work) noexcept {
   }
 }
 
-Connection::Connection(Socket socket, Hub& hub, Options options, std::string name,
-                       std::function<void()> on_closed)
+Session::Options Connection::sessionOptions() const {
+  Session::Options session{.subscriptions = options_.subscriptions, .features = {}};
+  if (socket_.isLocal()) session.features.emplace_back(transport::kMemfdFeature);
+  session.who = {.name = peer_.name(),
+                 .text = fmt::format("{} ({})", peer_.name(), name_),
+                 .lockstep_patience = options_.lockstep_wait};
+  if (hooks_.access) {
+    session.identify = [access = hooks_.access, peer = peer_, name = socket_.certifiedName()](const wire::Hello& hello) {
+      return access->identify(peer, hello.token, name);
+    };
+  }
+  session.idle = std::chrono::duration<double>{options_.idle}.count() * second;
+  return session;
+}
+
+Connection::Connection(Socket socket, Hub& hub, Options options, std::string name, Hooks hooks)
     : socket_(std::move(socket),
               wire::Limits{.header_bytes = options.request_bytes, .body_bytes = 0}),
       options_(options),
+      peer_(peerOf(socket_.socket())),
       name_(std::move(name)),
-      on_closed_(std::move(on_closed)),
+      hooks_(std::move(hooks)),
       timer_(socket_.socket().get_executor()),
       hub_(&hub) {}
 
 void Connection::start() {
   transport::setNoDelay(socket_.socket());
   if (!socket_.isLocal()) noticeVanishedPeer(socket_.socket().native_handle(), options_.patience);
-  // Not in the constructor: the waker holds this connection weakly, which needs one that is owned.
-  session_ = std::make_unique<Session>(*hub_, sessionOptions(options_, socket_.isLocal()), waker());
   giveUpAfter(options_.handshake, [this] {
+    if (!session_) return close();
     if (session_->isOpen()) return;
     dismiss(
         {Error::Code::Timeout, fmt::format("no Hello within {} ms", options_.handshake.count())});
   });
+  if (!hooks_.tls || socket_.isLocal()) return begin();
+  auto under_way = std::make_shared<UnderWay>(shared_from_this());
+  socket_.asyncEncrypt(hooks_.tls, {}, [this, under_way](const Result<>& agreed) {
+    under_way->is_over = true;
+    if (is_closed_) return;
+    if (agreed) return guarded([&] { begin(); });
+    guarded([&] { hooks_.log->warn(peer_.name(), "{}, {}: {}", name_, peer_.name(), agreed.error().message); });
+    close();
+  });
+}
+
+/// Once nobody else can listen. Not in the constructor: the waker holds this connection weakly, which needs one that is owned.
+void Connection::begin() {
+  session_ = std::make_unique<Session>(*hub_, sessionOptions(), waker());
   read();
 }
 
@@ -131,6 +153,10 @@ void Connection::take(Result<wire::Message> message) {
     if (is_hung_up_) drain();
     return;
   }
+  heard_ = std::chrono::steady_clock::now();
+  if (message && !is_admitted_) {
+    if (auto admitted = admit(*message); !admitted) return dismiss(admitted.error());
+  }
   if (message) {
     const auto* subscribe = std::get_if<wire::Subscribe>(&*message);
     if (subscribe != nullptr && subscribe->policy == wire::Policy::Lockstep) {
@@ -138,16 +164,39 @@ void Connection::take(Result<wire::Message> message) {
     }
     for (wire::Message& answer : session_->handle(*message)) answers_.push_back(std::move(answer));
     if (session_->isOver()) is_last_ = true;
+    if (std::holds_alternative<wire::Hello>(*message) && !is_last_) waitWhileIdle();
   } else if (message.error().code == Error::Code::Unsupported) {
     answers_.emplace_back(wire::Failure{socket_.refusedRequest(), message.error()});
   } else if (message.error().code == Error::Code::Disconnected) {
     return close();
   } else {
-    logging::warn("{}: {}; closing", name_, message.error().message);
+    hooks_.log->warn(peer_.name(), "{}, {}: {}; closing", name_, peer_.name(), message.error().message);
     return dismiss(message.error());
   }
   read();
   pump();
+}
+
+/// What is no Hello is the session's matter, which refuses it.
+Result<> Connection::admit(const wire::Message& first) {
+  if (!std::holds_alternative<wire::Hello>(first)) return {};
+  const Result<> admitted = hooks_.admit();
+  is_admitted_ = admitted.ok();
+  return admitted;
+}
+
+/// Older clients know no KeepAlive: whatever they do is taken for life, as long as their place is not needed.
+void Connection::waitWhileIdle() {
+  if (session_->client()->minor < wire::kFirstMinorWithKeepAlive) return timer_.cancel(), void();
+  const auto silence = std::chrono::steady_clock::now() - heard_;
+  if (silence >= options_.idle) {
+    return dismiss({Error::Code::Timeout, fmt::format("nothing was heard from this client for {} ms (limits.idle_s)",
+                                                      options_.idle.count())});
+  }
+  const auto rest = std::chrono::duration_cast<std::chrono::milliseconds>(options_.idle - silence);
+  giveUpAfter(rest + std::chrono::milliseconds{1}, [this] {
+    if (!is_last_) waitWhileIdle();
+  });
 }
 
 void Connection::pump() {
@@ -168,12 +217,16 @@ void Connection::send(const Session::Outgoing& outgoing) {
     guarded([&] { this->sent(result); });
   };
   is_writing_ = true;
+  frame_made_.reset();
   if (const auto* message = std::get_if<wire::Message>(&outgoing)) {
     return socket_.asyncWrite(encodeOrFailure(*message), sent);
   }
   const auto& [subscription, delivery, bodies] = std::get<Session::FrameOut>(outgoing);
   wire::FrameMessage message{subscription, delivery.frame->frame};
   message.frame.dropped_before = delivery.dropped_before;
+  frame_made_ = delivery.frame->made_at;
+  hub_->traffic().dropped += delivery.dropped_before;
+  hub_->traffic().bytes += delivery.frame->body.bytes;
   // The copy before the CRC, which another thread computes meanwhile.
   auto shared = bodies ? delivery.frame->sharedBody(*bodies) : nullptr;
   auto encoded = wire::encode(message, delivery.frame->summedBody());
@@ -190,12 +243,17 @@ void Connection::send(const Session::Outgoing& outgoing) {
 void Connection::sent(const Result<>& result) {
   is_writing_ = false;
   if (!result) return close();
+  if (frame_made_) {
+    ++hub_->traffic().frames;
+    hub_->traffic().latency.count(std::chrono::steady_clock::now() - *frame_made_);
+  }
   pump();
   if (!is_closed_) read();
 }
 
 void Connection::dismiss(Error why) {
   if (is_closed_ || is_last_) return;
+  if (!session_) return close();  // nothing can be told before there are keys
   // What the session has to tell (ends of subscriptions, late answers) goes first; frames do not.
   while (auto outgoing = session_->next()) {
     if (auto* message = std::get_if<wire::Message>(&*outgoing))
@@ -242,7 +300,7 @@ void Connection::close() noexcept {
   timer_.cancel(ignored);
   socket_.close();
   session_.reset();  // its subscriptions end now, not when the last handler has run
-  if (on_closed_) std::exchange(on_closed_, nullptr)();
+  if (hooks_.on_closed) std::exchange(hooks_.on_closed, nullptr)();
 }
 
 }  // namespace toftwin::daemon

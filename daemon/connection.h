@@ -13,6 +13,9 @@
 #include <memory>
 #include <string>
 
+#include "daemon/clock.h"
+#include "daemon/peer.h"
+#include "daemon/peer_log.h"
 #include "daemon/session.h"
 #include "protocol/transport/framed_socket.h"
 
@@ -29,22 +32,40 @@ class Connection : public std::enable_shared_from_this<Connection> {
     /// With a peer over TCP that does not answer, or takes nothing while something is to be sent.
     std::chrono::milliseconds patience{60'000};
     std::chrono::milliseconds lockstep_patience{10'000};  ///< likewise, if a source waits for it
+    std::chrono::milliseconds lockstep_wait{10'000};      ///< of others, for it to acknowledge
+    std::chrono::milliseconds idle{60'000};               ///< with one that says nothing
+  };
+  /// What it asks of the server.
+  struct Hooks {
+    std::function<Result<>()> admit;  ///< at its Hello; else it is told the error and closed
+    std::shared_ptr<const Access> access;  ///< shared by all; null: everybody may do all
+    std::shared_ptr<PeerLog> log;          ///< likewise
+    std::shared_ptr<const transport::TlsContext> tls{};  ///< likewise, of TCP; null: in clear text
+    std::function<void()> on_closed;
   };
 
-  Connection(transport::Socket socket, Hub& hub, Options options, std::string name,
-             std::function<void()> on_closed);
+  Connection(transport::Socket socket, Hub& hub, Options options, std::string name, Hooks hooks);
   void start();
   /// Sends the failure as the last message, after what is owed already, and closes.
   void dismiss(Error why);
   void close() noexcept;
+  [[nodiscard]] const Peer& peer() const { return peer_; }
+  /// It has said Hello and was let in, and has not been told to go.
+  [[nodiscard]] bool isAdmitted() const { return is_admitted_ && !is_last_; }
+  /// Since when it has said nothing.
+  [[nodiscard]] SteadyTime heard() const { return heard_; }
 
  private:
   struct UnderWay;
 
   template <class Work>
   void guarded(Work work) noexcept;
+  void begin();
   void read();
   void take(Result<wire::Message> message);
+  [[nodiscard]] Session::Options sessionOptions() const;
+  Result<> admit(const wire::Message& first);
+  void waitWhileIdle();
   void pump();
   void send(const Session::Outgoing& outgoing);
   void sent(const Result<>& result);
@@ -55,14 +76,18 @@ class Connection : public std::enable_shared_from_this<Connection> {
 
   transport::FramedSocket socket_;
   const Options options_;
+  const Peer peer_;
   const std::string name_;
-  std::function<void()> on_closed_;
-  boost::asio::steady_timer timer_;  ///< of the handshake, then of the farewell
+  Hooks hooks_;
+  boost::asio::steady_timer timer_;  ///< of the handshake, then of silence, then of the farewell
+  SteadyTime heard_ = std::chrono::steady_clock::now();
   std::atomic<bool> is_wake_posted_{false};
   Hub* hub_;
   std::unique_ptr<Session> session_;
   std::deque<wire::Message> answers_;
   std::array<char, 4096> scratch_{};
+  std::optional<SteadyTime> frame_made_;  ///< of the frame that is being written
+  bool is_admitted_ = false;
   bool is_reading_ = false;
   bool is_writing_ = false;
   bool is_last_ = false;  ///< closes when the answers are sent

@@ -24,23 +24,35 @@ namespace {
 
 namespace asio = boost::asio;
 
-Server::Options serverOptions(const LimitKeys& limits) {
-  const auto milliseconds = static_cast<std::int64_t>(limits.handshake.in(millisecond));
-  return {
-      .sessions = static_cast<std::size_t>(limits.sessions),
-      .connection = {.subscriptions = static_cast<std::size_t>(limits.subscriptions_per_session),
-                     .request_bytes = static_cast<std::uint32_t>(limits.request_kb) * 1024,
-                     .handshake = std::chrono::milliseconds{milliseconds}}};
+Server::Options serverOptions(const Config& config) {
+  const LimitKeys& limits = config.keys.limits;
+  const auto milliseconds = [](Duration time) {
+    return std::chrono::milliseconds{static_cast<std::int64_t>(time.in(millisecond))};
+  };
+  return {.sessions = static_cast<std::size_t>(limits.sessions),
+          .sessions_per_peer = static_cast<std::size_t>(limits.sessions_per_peer),
+          .greetings_per_peer = static_cast<std::size_t>(limits.greetings_per_peer),
+          .connection = {.subscriptions = static_cast<std::size_t>(limits.subscriptions_per_session),
+                         .request_bytes = static_cast<std::uint32_t>(limits.request_kb) * 1024,
+                         .handshake = milliseconds(limits.handshake),
+                         .lockstep_wait = milliseconds(limits.lockstep),
+                         .idle = milliseconds(limits.idle)},
+          .access = config.access,
+          .tls = config.tls};
 }
 
 Hub::Options hubOptions(const Config& config) {
   const auto bytes = [](int megabytes) { return static_cast<std::uint64_t>(megabytes) << 20; };
   const RecordingKeys& recording = config.keys.recording;
   return {.recording_folder = config.recording_folder,
-          .recording = {.most_bytes = bytes(recording.max_mb),
-                        .keep_free_bytes = bytes(recording.keep_free_mb)},
+          .recording = {.chunk_time = std::chrono::milliseconds{500},
+                        .most_bytes = bytes(recording.max_mb),
+                        .keep_free_bytes = bytes(recording.keep_free_mb),
+                        .first_frame_at_once = true},
           .backlog_bytes = bytes(config.keys.limits.subscription_backlog_mb),
-          .total_bytes = bytes(config.keys.limits.backlog_mb)};
+          .session_bytes = bytes(config.keys.limits.session_backlog_mb),
+          .total_bytes = bytes(config.keys.limits.backlog_mb),
+          .recordings_bytes = bytes(recording.backlog_mb)};
 }
 
 spdlog::level::level_enum levelOf(DaemonKeys::LogLevel level) {
@@ -60,7 +72,7 @@ spdlog::level::level_enum levelOf(DaemonKeys::LogLevel level) {
 constexpr std::chrono::milliseconds kBreath{20};
 
 bool sameListen(const ListenKeys& a, const ListenKeys& b) {
-  return a.address == b.address && a.port == b.port && a.socket == b.socket;
+  return a.address == b.address && a.port == b.port && a.socket == b.socket && a.metrics_port == b.metrics_port;
 }
 
 }  // namespace
@@ -93,7 +105,7 @@ Hub& Daemon::hub() { return loop_->hub(); }
 Daemon::Loop::Loop(Options options, const Config& config)
     : options_(std::move(options)),
       hub_(hubOptions(config), *options_.clock),
-      server_(io_, hub_, serverOptions(config.keys.limits)),
+      server_(io_, hub_, serverOptions(config)),
       facades_(io_, hub_, *options_.clock),
       signals_(io_),
       watchdog_(io_),
@@ -107,6 +119,7 @@ Daemon::Loop::~Loop() {
 /// Sources run only once it is clear that this daemon may listen: a second one must not touch cameras.
 Result<> Daemon::Loop::begin(Config config) {
   if (auto listening = listen(config.keys.listen); !listening) return listening;
+  if (auto listening = listenForMetrics(config.keys.listen.metrics_port); !listening) return listening;
   if (options_.handle_signals) handleSignals();  // before anyone is told that it is ready
   apply(std::move(config));
   notify::ready(statusLine());
@@ -132,6 +145,29 @@ Result<> Daemon::Loop::listen(ListenKeys keys) {
     logging::info("listening on {}", path);
   if (!keys.address.empty()) logging::info("listening on {} port {}", keys.address, server_.port());
   return {};
+}
+
+Result<> Daemon::Loop::listenForMetrics(int port) {
+  if (port == 0) return {};
+  auto opened = MetricsServer::open(io_, static_cast<std::uint16_t>(port),
+                                    [this] { return openMetrics(hub_, options_.log_lines_lost()); });
+  if (!opened) return opened.error();
+  metrics_ = *std::move(opened);
+  logging::info("metrics: http://127.0.0.1:{}/metrics", port);
+  return {};
+}
+
+/// Without it clients are served all the same: what goes wrong is told, and the log gets what was for the file.
+void Daemon::Loop::openAudit(const std::filesystem::path& file) {
+  auto audit = std::make_shared<AuditLog>(*options_.clock);
+  if (!file.empty()) {
+    if (auto opened = AuditLog::open(file, *options_.clock)) {
+      audit = *std::move(opened);
+    } else {
+      logging::error("the audit log is this log: {}", opened.error().message);
+    }
+  }
+  hub_.setAudit(std::move(audit));
 }
 
 /// A machine without a folder for "auto" (a container, su, cron) has TCP all the same; a path that
@@ -183,7 +219,8 @@ void Daemon::Loop::apply(Config config) {
 void Daemon::Loop::applyKeys(const Config& config) {
   spdlog::set_level(levelOf(config.keys.log_level));
   hub_.setOptions(hubOptions(config));
-  server_.setOptions(serverOptions(config.keys.limits));
+  server_.setOptions(serverOptions(config));
+  openAudit(config.audit_log);
   source_stuck_ = config.keys.limits.source_stuck;
   if (!sameListen(listen_, config.keys.listen)) {
     logging::warn("[listen] has changed, which takes effect only after a restart");
@@ -204,6 +241,7 @@ void Daemon::Loop::run(ConfiguredSource source) {
   logging::info("source {}: driver {}", source.keys.name, source.driver->name);
   hub_.add(std::make_shared<SourceHost>(source.keys.name, open, std::move(source.opened), options,
                                         *options_.clock));
+  if (source.record) hub_.keepRecording(source.keys.name, *source.record);
 }
 
 void Daemon::Loop::reload() {
@@ -340,6 +378,7 @@ void Daemon::Loop::beginStop() {
     gone->clear();
     asio::post(io_, [this] {
       facades_.stop();
+      metrics_.reset();
       server_.shutDown({Error::Code::Stopped, "the daemon is stopping"}, [] {});
     });
   });

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -27,6 +28,7 @@ class Daemon {
     bool handle_signals = false;        ///< SIGTERM and SIGINT stop the daemon, SIGHUP reloads it
     std::span<const drivers::Driver> drivers = drivers::allDrivers();
     const Clock* clock = &systemClock();
+    std::function<std::uint64_t()> log_lines_lost = [] { return std::uint64_t{0}; };  ///< for the metrics
   };
 
   static Result<std::unique_ptr<Daemon>> start(Options options);

@@ -21,6 +21,7 @@
 #include "daemon/daemon.h"
 #include "daemon/facades/facades.h"
 #include "daemon/hub.h"
+#include "daemon/metrics.h"
 #include "daemon/server.h"
 
 namespace toftwin::daemon {
@@ -49,6 +50,8 @@ class Daemon::Loop {
 
   Result<> listen(ListenKeys keys);
   Result<> listenUnix(const ListenKeys& keys);
+  Result<> listenForMetrics(int port);
+  void openAudit(const std::filesystem::path& file);
   void apply(Config config);
   void applyKeys(const Config& config);
   void run(ConfiguredSource source);
@@ -68,6 +71,7 @@ class Daemon::Loop {
   boost::asio::io_context io_{1};
   Hub hub_;
   Server server_;
+  std::unique_ptr<MetricsServer> metrics_;  ///< null: not wanted
   Facades facades_;
   boost::asio::signal_set signals_;
   boost::asio::steady_timer watchdog_;

@@ -18,11 +18,16 @@ void Hub::setOptions(Options options) {
   const std::scoped_lock lock{mutex_};
   options_ = std::move(options);
   budget_->setLimit(options_.total_bytes);
+  recordings_budget_->setLimit(options_.recordings_bytes);
 }
 
 Hub::Options Hub::options() const {
   const std::scoped_lock lock{mutex_};
   return options_;
+}
+
+std::shared_ptr<Account> Hub::clientAccount() const {
+  return std::make_shared<Account>(budget_, options().session_bytes);
 }
 
 std::shared_ptr<transport::SharedBodies> Hub::sharedBodies() {
@@ -104,6 +109,7 @@ wire::Health Hub::health() const {
       last_error = problem + (last_error.empty() ? "" : "; camera: " + last_error);
     const auto recorder = recorders_.find(name);
     if (recorder == recorders_.end()) continue;
+    if (!recorder->second->isFinished()) health.sources.back().recording_by = recorder->second->owner().text;
     if (std::string problem = recorder->second->problem(); !problem.empty()) {
       last_error = "recording: " + problem;
     }
@@ -116,21 +122,24 @@ void Hub::setFacades(std::vector<ToldFacade> facades) {
   facades_ = std::move(facades);
 }
 
-void Hub::startRecording(const std::string& source, std::string_view file, RecordDone done) {
+void Hub::startRecording(const std::string& source, std::string_view file, Subscribing owner, RecordDone done) {
   auto host = find(source);
   if (!host) return done(host.error());
   const Options now = options();
   auto path = recordingPath(now.recording_folder, file);
   if (!path) return done(path.error());
   auto recorder = std::make_shared<Recorder>(
-      *host, *path, Recorder::Options{now.recording, now.backlog_bytes, budget_});
+      *host, *path,
+      Recorder::Options{now.recording, now.backlog_bytes,
+                        std::make_shared<Account>(recordings_budget_, now.recordings_bytes), std::move(owner)});
   std::shared_ptr<Recorder> before;  // destroyed without the lock
   {
     const std::scoped_lock lock{mutex_};
     const auto [at, is_first] = recorders_.try_emplace(source, recorder);
     if (!is_first && !at->second->isFinished()) {
       return done(Error{Error::Code::Busy,
-                        fmt::format("the source \"{}\" is being recorded already; stop that first", source)});
+                        fmt::format("the source \"{}\" is being recorded already, for {}; stop that first", source,
+                                    at->second->owner().text)});
     }
     if (!is_first) before = std::exchange(at->second, recorder);
   }
@@ -140,7 +149,40 @@ void Hub::startRecording(const std::string& source, std::string_view file, Recor
   });
 }
 
-void Hub::stopRecording(const std::string& source, RecordDone done) {
+void Hub::keepRecording(const std::string& source, const RecordPlan& plan) {
+  const auto host = find(source);
+  if (!host) return;
+  const Options now = options();
+  Recorder::Options recording{now.recording, now.backlog_bytes,
+                              std::make_shared<Account>(recordings_budget_, now.recordings_bytes),
+                              {.name = "the configuration", .text = "the configuration"}};
+  recording.plan = plan;
+  recording.file.sync_chunks = true;
+  recording.clock = &clock_;
+  auto recorder = std::make_shared<Recorder>(*host, plan.pattern, std::move(recording));
+  {
+    const std::scoped_lock lock{mutex_};
+    recorders_.insert_or_assign(source, recorder);
+  }
+  recorder->start([](const Result<std::filesystem::path>&) {});
+}
+
+void Hub::setAudit(std::shared_ptr<AuditLog> audit) {
+  const std::scoped_lock lock{mutex_};
+  audit_ = std::move(audit);
+}
+
+std::shared_ptr<AuditLog> Hub::auditLog() const {
+  const std::scoped_lock lock{mutex_};
+  return audit_;
+}
+
+void Hub::audit(const std::string& who, const std::string& source, const std::string& what,
+                const Result<>& outcome) const {
+  if (const auto log = auditLog()) log->tell(who, source, what, outcome);
+}
+
+void Hub::stopRecording(const std::string& source, const std::optional<std::string>& by, RecordDone done) {
   auto host = find(source);
   if (!host) return done(host.error());
   std::shared_ptr<Recorder> recorder;
@@ -153,6 +195,11 @@ void Hub::stopRecording(const std::string& source, RecordDone done) {
         Error{Error::Code::NotFound,
               fmt::format("the source \"{}\" is not being recorded, so there is nothing to stop",
                           source)});
+  }
+  if (by && recorder->owner().name != *by) {
+    return done(Error{Error::Code::PermissionDenied,
+                      fmt::format("the recording of \"{}\" belongs to {}: ask them, or stop it as the daemon's own user",
+                                  source, recorder->owner().text)});
   }
   recorder->stop([done](const Result<std::filesystem::path>& closed) {
     if (closed) return done(closed->string());

@@ -88,7 +88,7 @@ bool Recorder::isSettled() const {
 
 std::string Recorder::problem() const {
   const std::scoped_lock lock{mutex_};
-  return outcome_ && !*outcome_ && !is_told_ ? outcome_->error().message : std::string{};
+  return outcome_ && !*outcome_ && !is_told_ ? outcome_->error().message : problem_;
 }
 
 /// Nothing that is thrown leaves the thread: the recording ends with it, the daemon does not.
@@ -99,7 +99,8 @@ void Recorder::run(const Done& opened) noexcept {
     opened(std::move(result));
   };
   try {
-    finish(recordUntilEnd(answer));
+    if (options_.plan) recordOnAndOn();
+    finish(options_.plan ? Result<>{} : recordUntilEnd(answer));
   } catch (...) {
     try {
       const Error why = thrownError("recording");
@@ -122,36 +123,55 @@ Error Recorder::notOpened(const Done& opened, Error why) {
   return why;
 }
 
-Result<> Recorder::recordUntilEnd(const Done& opened) {
-  const Wish everything{{},
-                        {.policy = wire::Policy::Lossless,
-                         .byte_limit = options_.backlog_bytes,
-                         .budget = options_.budget}};
-  // Before a file is made for nothing.
-  if (auto possible = source_->check(everything); !possible) return notOpened(opened, possible.error());
-  std::error_code reported_by_create;
-  std::filesystem::create_directories(file_.parent_path(), reported_by_create);
-  auto writer = record::Writer::create(file_, options_.file);
-  if (!writer) return notOpened(opened, writer.error());
-  auto subscribed = source_->subscribe(everything, [work = work_] {
+Wish Recorder::everything() const {
+  return {{},
+          {.policy = wire::Policy::Lossless,
+           .byte_limit = options_.backlog_bytes,
+           .account = options_.account,
+           .keeps_at_overrun = true},
+          options_.who};
+}
+
+Result<SubscriberPtr> Recorder::subscribe() {
+  return source_->subscribe(everything(), [work = work_] {
     {
       const std::scoped_lock lock{work->mutex};
       work->has_items = true;
     }
     work->changed.notify_all();
   });
+}
+
+namespace {
+
+/// However a recording ends, its source is left.
+struct Unsubscribe {
+  SourceHost& source;
+  const SubscriberPtr& subscriber;
+  ~Unsubscribe() { source.unsubscribe(subscriber); }
+};
+
+void tellRecorded(const std::string& source, const std::filesystem::path& file, const record::Writer& writer) {
+  logging::info("{}: recorded {} frames into {}{}", source, writer.frames(), file.string(),
+                writer.lost() > 0 ? fmt::format("; {} more did not fit", writer.lost()) : "");
+}
+
+}  // namespace
+
+Result<> Recorder::recordUntilEnd(const Done& opened) {
+  // Before a file is made for nothing.
+  if (auto possible = source_->check(everything()); !possible) return notOpened(opened, possible.error());
+  std::error_code reported_by_create;
+  std::filesystem::create_directories(file_.parent_path(), reported_by_create);
+  auto writer = record::Writer::create(file_, options_.file);
+  if (!writer) return notOpened(opened, writer.error());
+  auto subscribed = subscribe();
   if (!subscribed) return notOpened(opened, subscribed.error());
-  struct Unsubscribe {
-    SourceHost& source;
-    const SubscriberPtr& subscriber;
-    ~Unsubscribe() { source.unsubscribe(subscriber); }
-  } const at_the_end{*source_, *subscribed};
+  const Unsubscribe at_the_end{*source_, *subscribed};
   opened(file_);
   Result<> written = writeAll(*writer, *subscribed);
   const Result<> closed = writer->close();
-  logging::info("{}: recorded {} frames into {}{}", source_->name(), writer->frames(),
-                file_.string(),
-                writer->lost() > 0 ? fmt::format("; {} more did not fit", writer->lost()) : "");
+  tellRecorded(source_->name(), file_, *writer);
   if (!written && written.error().code == Error::Code::StorageFull) {
     return Error{Error::Code::StorageFull,
                  fmt::format("{} (recording.max_mb = {}, recording.keep_free_mb = {})",
@@ -164,17 +184,25 @@ Result<> Recorder::recordUntilEnd(const Done& opened) {
 Result<> Recorder::writeAll(record::Writer& writer, const SubscriberPtr& subscriber) {
   bool is_unsubscribed = false;
   while (true) {
-    while (auto item = subscriber->backlog.take()) {
-      if (const Error* end = std::get_if<Error>(&*item)) {
-        const bool is_natural =
-            end->code == Error::Code::EndOfStream || end->code == Error::Code::Stopped;
-        return is_natural ? Result<>{} : *end;
-      }
-      const Frame& frame = std::get<Backlog::Delivery>(*item).frame->frame;
-      if (auto written = writer.write(frame); !written) return written;
+    const auto frame = nextFrame(subscriber, is_unsubscribed);
+    if (!frame) return frame.error();
+    if (!*frame) return {};
+    if (auto written = writer.write((*frame)->frame); !written) return written;
+  }
+}
+
+/// Waits for it; null at the source's end, and when all is written after the recording was stopped.
+Result<PreparedFramePtr> Recorder::nextFrame(const SubscriberPtr& subscriber, bool& is_unsubscribed) {
+  while (true) {
+    if (auto item = subscriber->backlog.take()) {
+      if (auto* delivery = std::get_if<Backlog::Delivery>(&*item)) return std::move(delivery->frame);
+      const Error& end = std::get<Error>(*item);
+      const bool is_natural = end.code == Error::Code::EndOfStream || end.code == Error::Code::Stopped;
+      if (is_natural) return PreparedFramePtr{};
+      return end;
     }
     std::unique_lock lock{work_->mutex};
-    if (work_->is_stopping && is_unsubscribed) return {};
+    if (work_->is_stopping && is_unsubscribed) return PreparedFramePtr{};
     if (work_->is_stopping) {
       // Nothing comes after this, so what waits then is all: every frame that a client has seen.
       lock.unlock();

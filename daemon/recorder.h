@@ -13,6 +13,7 @@
 
 #include <toftwin/result.h>
 
+#include "daemon/record_plan.h"
 #include "daemon/source_host.h"
 #include "protocol/record/recording.h"
 
@@ -30,7 +31,10 @@ class Recorder {
   struct Options {
     record::WriterOptions file;
     std::uint64_t backlog_bytes = 256ull << 20;  ///< what may wait to be written
-    std::shared_ptr<Budget> budget;
+    std::shared_ptr<Account> account{};  ///< of the recordings' reserve
+    Subscribing who{};                   ///< whose it is
+    std::optional<RecordPlan> plan{};    ///< of one that goes on and on, into files of its names
+    const Clock* clock = &systemClock();  ///< for those names
   };
   /// Gets the file's path, or why it could not be opened or finished.
   using Done = std::function<void(Result<std::filesystem::path>)>;
@@ -47,6 +51,7 @@ class Recorder {
   /// once if the recording has ended already.
   void stop(Done closed);
   [[nodiscard]] bool isFinished() const;
+  [[nodiscard]] const Subscribing& owner() const { return options_.who; }
   /// Whether it has ended and somebody who stopped it was told how: there is nothing left to stop.
   [[nodiscard]] bool isSettled() const;
   /// What went wrong, as long as nobody was told, or empty.
@@ -57,7 +62,17 @@ class Recorder {
   void run(const Done& opened) noexcept;
   Error notOpened(const Done& opened, Error why);
   Result<> recordUntilEnd(const Done& opened);
+  void recordOnAndOn();
+  Result<> recordFiles();
+  Result<PreparedFramePtr> nextFrame(const SubscriberPtr& subscriber, bool& is_unsubscribed);
   Result<> writeAll(record::Writer& writer, const SubscriberPtr& subscriber);
+  Result<> openNext(std::optional<record::Writer>& writer);
+  Result<> writeInto(std::optional<record::Writer>& writer, const Frame& frame);
+  Result<> closeLast(std::optional<record::Writer>& writer);
+  [[nodiscard]] Wish everything() const;
+  Result<SubscriberPtr> subscribe();
+  void noteProblem(const Result<>& outcome);
+  [[nodiscard]] bool waitBeforeAnother();
   void finish(Result<> outcome);
 
   const std::shared_ptr<SourceHost> source_;  // shared with the hub and sessions
@@ -73,7 +88,12 @@ class Recorder {
   };
   const std::shared_ptr<Work> work_ = std::make_shared<Work>();
 
-  mutable std::mutex mutex_;  // guards the next three
+  // Of one that goes on and on; used on its thread.
+  std::filesystem::path writing_;
+  HostTime began_{};  ///< the file
+
+  mutable std::mutex mutex_;  // guards the next four
+  std::string problem_;       ///< of one that goes on and on, until it does
   std::optional<Result<std::filesystem::path>> outcome_;
   Done closed_;
   bool is_told_ = false;

@@ -5,6 +5,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 #include <vector>
 
@@ -16,13 +17,14 @@ namespace {
 
 namespace asio = boost::asio;
 constexpr std::chrono::milliseconds kAcceptPause{100};
+constexpr std::size_t kMostGreetings = 256;  ///< connections that have said no Hello, or were told to go
 
 }  // namespace
 
 Server::Server(asio::io_context& io, Hub& hub, Options options)
     : io_(io),
       hub_(hub),
-      options_(options),
+      options_(std::move(options)),
       tcp_accepting_{asio::steady_timer{io}},
       unix_accepting_{asio::steady_timer{io}} {}
 
@@ -104,19 +106,62 @@ void Server::tryToAdopt(transport::Socket socket) {
 
 void Server::adopt(transport::Socket socket) {
   const std::uint64_t id = ++last_id_;
-  const bool is_full = connections_.size() >= options_.sessions;
-  auto connection =
-      std::make_shared<Connection>(std::move(socket), hub_, options_.connection,
-                                   fmt::format("client {}", id), [this, id] { forget(id); });
+  auto connection = std::make_shared<Connection>(
+      std::move(socket), hub_, options_.connection, fmt::format("client {}", id),
+      Connection::Hooks{.admit = [this, id] { return admit(id); },
+                        .access = options_.access,
+                        .log = log_,
+                        .tls = options_.tls,
+                        .on_closed = [this, id] { forget(id); }});
+  makeRoomForGreeting(connection->peer().name());
   connections_.emplace(id, connection);
   connection->start();
-  if (!is_full) return logging::debug("client {}: connected", id);
-  logging::warn("client {}: turned away, limits.sessions = {} is reached", id, options_.sessions);
-  connection->dismiss(
-      {Error::Code::Busy,
-       fmt::format("this daemon has {} clients already, the most that limits.sessions "
-                   "allows: close one, or raise the limit",
-                   options_.sessions)});
+  logging::debug("client {}: connected, {}", id, connection->peer().name());
+}
+
+/// Whoever has said no Hello costs a place among those of the same peer only: the oldest goes.
+void Server::makeRoomForGreeting(const std::string& peer) {
+  std::size_t waiting = 0, of_peer = 0;
+  std::shared_ptr<Connection> oldest, oldest_of_peer;
+  for (const auto& [id, one] : connections_) {  // in the order in which they came
+    if (one->isAdmitted()) continue;
+    if (waiting++ == 0) oldest = one;
+    if (one->peer().name() == peer && of_peer++ == 0) oldest_of_peer = one;
+  }
+  if (of_peer >= options_.greetings_per_peer) return oldest_of_peer->close();
+  if (waiting >= kMostGreetings) oldest->close();
+}
+
+std::size_t Server::admitted(const std::optional<std::string>& peer) const {
+  return static_cast<std::size_t>(std::ranges::count_if(connections_, [&](const auto& one) {
+    return one.second->isAdmitted() && (!peer || one.second->peer().name() == *peer);
+  }));
+}
+
+bool Server::letGoOfSilent(const std::optional<std::string>& peer) {
+  std::shared_ptr<Connection> silent;
+  for (const auto& [id, one] : connections_) {
+    if (!one->isAdmitted() || (peer && one->peer().name() != *peer)) continue;
+    if (!silent || one->heard() < silent->heard()) silent = one;
+  }
+  if (!silent || std::chrono::steady_clock::now() - silent->heard() < options_.connection.idle) return false;
+  silent->dismiss({Error::Code::Timeout, "another client needs the place, and this one has been silent for longest"});
+  return true;
+}
+
+/// Of a client that has said Hello: whether there is a place for it.
+Result<> Server::admit(std::uint64_t id) {
+  const std::string peer = connections_.at(id)->peer().name();
+  const auto busy = [&](const std::string& who, std::size_t limit, const char* key) {
+    log_->warn(peer, "client {}: turned away, {} = {} is reached by {}", id, key, limit, who);
+    return Error{Error::Code::Busy, fmt::format("this daemon has {} clients of {} already, the most that {} allows: "
+                                                "close one, or raise the limit",
+                                                limit, who, key)};
+  };
+  if (admitted(peer) >= options_.sessions_per_peer && !letGoOfSilent(peer))
+    return busy(peer, options_.sessions_per_peer, "limits.sessions_per_peer");
+  if (admitted() >= options_.sessions && !letGoOfSilent()) return busy("all", options_.sessions, "limits.sessions");
+  return {};
 }
 
 void Server::forget(std::uint64_t id) {

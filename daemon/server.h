@@ -23,7 +23,11 @@ class Server {
  public:
   struct Options {
     std::size_t sessions = 64;
+    std::size_t sessions_per_peer = 48;   ///< of one user of this machine, or of one other machine
+    std::size_t greetings_per_peer = 32;  ///< connections of such a one that have not said Hello
     Connection::Options connection;
+    std::shared_ptr<const Access> access{};  ///< shared by the connections
+    std::shared_ptr<const transport::TlsContext> tls{};  ///< likewise, of TCP; null: in clear text
   };
 
   Server(boost::asio::io_context& io, Hub& hub, Options options);
@@ -32,7 +36,7 @@ class Server {
   /// Accepts again where something thrown kept it from that.
   void keepAccepting();
   /// For clients that come from now on.
-  void setOptions(Options options) { options_ = options; }
+  void setOptions(Options options) { options_ = std::move(options); }
 
   /// The TCP port that it listens on, 0 if none.
   [[nodiscard]] std::uint16_t port() const;
@@ -57,6 +61,12 @@ class Server {
   void tryToAdopt(transport::Socket socket);
   void adopt(transport::Socket socket);
   void forget(std::uint64_t id);
+  Result<> admit(std::uint64_t id);
+  void makeRoomForGreeting(const std::string& peer);
+  /// Those of that peer, or all.
+  [[nodiscard]] std::size_t admitted(const std::optional<std::string>& peer = {}) const;
+  /// Lets go of the one of them that has been silent for longest, if it has been for long.
+  bool letGoOfSilent(const std::optional<std::string>& peer = {});
 
   boost::asio::io_context& io_;
   Hub& hub_;
@@ -68,6 +78,7 @@ class Server {
   bool is_shut_ = false;
   std::map<std::uint64_t, std::shared_ptr<Connection>> connections_;  // shared with their handlers
   std::uint64_t last_id_ = 0;
+  const std::shared_ptr<PeerLog> log_ = std::make_shared<PeerLog>();  // shared by the connections
   std::function<void()> on_empty_;
 };
 

@@ -27,7 +27,7 @@ wire::Message failure(std::uint64_t id, Error error) { return wire::Failure{id, 
 
 /// How a backlog serves the policy asked for, or why that policy makes no sense.
 Result<Backlog::Settings> backlogFor(const wire::Subscribe& request, std::uint64_t byte_limit,
-                                     const std::shared_ptr<Budget>& budget) {
+                                     const std::shared_ptr<Account>& account) {
   const auto invalid = [](std::string why) {
     return Error{Error::Code::InvalidArgument, std::move(why)};
   };
@@ -54,7 +54,7 @@ Result<Backlog::Settings> backlogFor(const wire::Subscribe& request, std::uint64
                            .depth = request.queue,
                            .max_rate_hz = request.max_rate_hz,
                            .byte_limit = byte_limit,
-                           .budget = budget};
+                           .account = account};
 }
 
 }  // namespace
@@ -77,9 +77,11 @@ std::optional<wire::Message> Outbox::take() {
 
 Session::Session(Hub& hub, Options options, std::function<void()> wake)
     : hub_(hub),
+      account_(hub.clientAccount()),
       options_(std::move(options)),
       wake_(std::move(wake)),
-      outbox_(std::make_shared<Outbox>(wake_)) {
+      outbox_(std::make_shared<Outbox>(wake_)),
+      who_(options_.who) {
   ++hub_.sessions;
 }
 
@@ -126,20 +128,23 @@ std::optional<Session::Outgoing> Session::next() {
 
 std::optional<Session::Outgoing> Session::nextOf(Subscriptions::iterator at) {
   auto& [source, subscriber, window, bodies, on_way] = at->second;
-  if (window > 0 && on_way.size() >= window) return std::nullopt;
+  // An end is told at once: whoever never acknowledges would keep its room for ever.
+  const bool has_window = window > 0 && !subscriber->backlog.isOver();
+  if (has_window && on_way.size() >= window) return std::nullopt;
   // Room for the first was reserved. Without any for another, the next acknowledgement is waited for.
-  Share share;
-  if (window > 0 && !on_way.empty()) {
-    auto another = subscriber->backlog.another(subscriber->frame_bytes);
+  Hold hold;
+  const PreparedFramePtr next = has_window && !on_way.empty() ? subscriber->backlog.peek() : nullptr;
+  if (next) {
+    auto another = subscriber->backlog.another(next);
     if (!another) return std::nullopt;
-    share = *std::move(another);
+    hold = *std::move(another);
   }
   auto item = subscriber->backlog.take();
   if (!item) return std::nullopt;
   const std::uint64_t id = at->first;
   if (auto* delivery = std::get_if<Backlog::Delivery>(&*item)) {
     last_served_ = id;
-    if (window > 0) on_way.push_back({delivery->frame->frame.sequence, std::move(share)});
+    if (window > 0) on_way.push_back({delivery->frame->frame.sequence, std::move(hold)});
     return FrameOut{id, std::move(*delivery), bodies};
   }
   source->unsubscribe(subscriber);
@@ -163,8 +168,18 @@ Session::Answers Session::breakOff(std::uint64_t id, Error::Code code, std::stri
 
 Session::Answers Session::on(const wire::Hello& hello) {
   if (client_) return breakOff(0, Error::Code::Malformed, "a second Hello");
+  if (options_.identify) {
+    auto identity = options_.identify(hello);
+    if (!identity) return breakOff(hello.id, identity.error().code, identity.error().message);
+    who_.name = identity->name;
+    if (!who_.text.starts_with(who_.name)) who_.text = fmt::format("{}, {}", who_.name, who_.text);
+    grants_ = identity->grants;
+  }
   client_ = hello;
-  return {wire::Hello{hello.id, "toftwind " TOFTWIN_VERSION, options_.features}};
+  client_->token.clear();  // nobody needs it any more
+  wire::Hello answer{hello.id, "toftwind " TOFTWIN_VERSION, options_.features};
+  if (hello.minor >= wire::kFirstMinorWithKeepAlive) answer.idle = options_.idle;
+  return {std::move(answer)};
 }
 
 Session::Answers Session::on(const wire::ListSources& request) {
@@ -191,12 +206,15 @@ Session::Answers Session::on(const wire::Subscribe& request) {
                                  "limits.subscriptions_per_session allows",
                                  subscriptions_.size())})};
   }
+  if (request.policy == wire::Policy::Lockstep) {
+    if (auto why = refusal(grants_.control, "hold a source in lockstep", "control")) return {failure(request.id, *why)};
+  }
   auto source = hub_.find(request.source);
   if (!source) return {failure(request.id, source.error())};
   if (std::ranges::any_of(request.planes, [this](PlaneKind kind) { return kind > lastKindOfClient(); }))
     return {failure(request.id, {Error::Code::Unsupported,
                                  "a plane was asked for that the client's version of the protocol does not have"})};
-  auto backlog = backlogFor(request, hub_.options().backlog_bytes, hub_.budget());
+  auto backlog = backlogFor(request, hub_.options().backlog_bytes, account_);
   if (!backlog) return {failure(request.id, backlog.error())};
   Wish wish;  // filled one by one: GCC 12 warns of nested braces here, without a cause
   wish.selection.planes = request.planes;
@@ -209,6 +227,7 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   wish.selection.region = request.region;
   wish.selection.decimation = request.decimation;
   wish.backlog = *std::move(backlog);
+  wish.who = who_;
   const bool in_shared_memory = request.window > 0 && usesSharedMemory();
   const bool is_lockstep = request.policy == wire::Policy::Lockstep;
   const std::uint64_t id = ++last_subscription_;
@@ -220,6 +239,7 @@ Session::Answers Session::on(const wire::Subscribe& request) {
   if (!subscriber) return {failure(request.id, subscriber.error())};
   made.begin()->second.subscriber = *std::move(subscriber);
   subscriptions_.merge(made);
+  if (is_lockstep) hub_.audit(who_.text, request.source, "hold in lockstep", {});
   return answer;
 }
 
@@ -247,50 +267,80 @@ Session::Answers Session::on(const wire::Acknowledge& request) {
   return {};
 }
 
+std::optional<Error> Session::refusal(bool is_granted, std::string_view what, std::string_view role) const {
+  if (is_granted) return std::nullopt;
+  return Error{Error::Code::PermissionDenied,
+               fmt::format("{} may not {}: that takes the role {} ([roles] of the daemon's configuration)", who_.name, what,
+                           role)};
+}
+
 Session::Answers Session::on(const wire::SetPose& request) {
+  const auto& [rotation, translation] = request.world_from_camera;
   return command(
       request.id, request.source,
+      fmt::format("set pose {:g} {:g} {:g} {:g}, {:g} {:g} {:g} m", rotation[0], rotation[1], rotation[2], rotation[3],
+                  translation.x, translation.y, translation.z),
       [pose = request.world_from_camera](drivers::Source& source) { return source.setPose(pose); });
 }
 
 Session::Answers Session::on(const wire::SetParameter& request) {
-  return command(request.id, request.source,
+  const std::string value = request.text ? printable(*request.text) : fmt::format("{:g}", request.value);
+  return command(request.id, request.source, fmt::format("set {} = {}", printable(request.name), value),
                  [name = request.name, value = request.value, text = request.text](drivers::Source& source) {
                    return text ? source.setParameterText(name, *text) : source.setParameter(name, value);
                  });
 }
 
 Session::Answers Session::on(const wire::Trigger& request) {
+  if (auto why = refusal(grants_.control, "trigger a source", "control")) return {failure(request.id, *why)};
   auto source = hub_.find(request.source);
   if (!source) return {failure(request.id, source.error())};
-  (*source)->trigger(owing(request.id));
+  open_.insert(request.id);
+  (*source)->trigger([id = request.id, outbox = outbox_](const Result<>& result) {  // too many for the audit log
+    outbox->put(result ? wire::Message{wire::Done{id, {}}} : failure(id, result.error()));
+  });
   return {};
 }
 
-Session::Answers Session::command(std::uint64_t id, const std::string& name,
+Session::Answers Session::command(std::uint64_t id, const std::string& name, std::string what,
                                   SourceHost::Command command) {
+  if (auto why = refusal(grants_.control, "set a source", "control")) {
+    hub_.audit(who_.text, printable(name), what, *why);
+    return {failure(id, *why)};
+  }
   auto source = hub_.find(name);
   if (!source) return {failure(id, source.error())};
-  (*source)->post(std::move(command), owing(id));
+  (*source)->post(std::move(command), owing(id, name, std::move(what)));
   return {};
 }
 
-SourceHost::Done Session::owing(std::uint64_t id) {
+SourceHost::Done Session::owing(std::uint64_t id, const std::string& source, std::string what) {
   open_.insert(id);
-  return [id, outbox = outbox_](const Result<>& result) {
+  return [id, outbox = outbox_, audit = hub_.auditLog(), who = who_.text, source,
+          what = std::move(what)](const Result<>& result) {
+    if (audit) audit->tell(who, source, what, result);
     outbox->put(result ? wire::Message{wire::Done{id, {}}} : failure(id, result.error()));
   };
 }
 
 Session::Answers Session::on(const wire::Record& request) {
-  const auto done = [id = request.id, outbox = outbox_](const Result<std::string>& result) {
+  const std::string what =
+      request.file.empty() ? "stop recording" : fmt::format("record into {}", printable(request.file));
+  if (auto why = refusal(grants_.record, "record", "record")) {
+    hub_.audit(who_.text, printable(request.source), what, *why);
+    return {failure(request.id, *why)};
+  }
+  const auto done = [id = request.id, outbox = outbox_, audit = hub_.auditLog(), who = who_.text,
+                     source = printable(request.source), what](const Result<std::string>& result) {
+    if (audit) audit->tell(who, source, what, result ? Result<>{} : Result<>{result.error()});
     outbox->put(result ? wire::Message{wire::Done{id, *result}} : failure(id, result.error()));
   };
   open_.insert(request.id);
   if (request.file.empty()) {
-    hub_.stopRecording(request.source, done);
+    const auto by = grants_.admin ? std::nullopt : std::optional{who_.name};
+    hub_.stopRecording(request.source, by, done);
   } else {
-    hub_.startRecording(request.source, request.file, done);
+    hub_.startRecording(request.source, request.file, who_, done);
   }
   return {};
 }

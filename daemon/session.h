@@ -13,6 +13,7 @@
 #include <variant>
 #include <vector>
 
+#include "daemon/access.h"
 #include "daemon/hub.h"
 #include "protocol/wire/messages.h"
 
@@ -38,6 +39,10 @@ class Session {
   struct Options {
     std::size_t subscriptions = 16;  ///< at once
     std::vector<std::string> features;
+    Subscribing who{};
+    /// Who the client is, which its Hello may say; without it, `who`, who may do all.
+    std::function<Result<Identity>(const wire::Hello&)> identify{};
+    std::optional<Duration> idle{};  ///< for the Hello: silence that ends the connection
   };
   /// A frame for one subscription, to be encoded around the shared body.
   struct FrameOut {
@@ -76,7 +81,7 @@ class Session {
     std::shared_ptr<transport::SharedBodies> bodies;  // shared by all that take bodies that way
     struct OnWay {
       std::uint64_t sequence = 0;
-      Share share;  ///< of the budget
+      Hold hold;  ///< nothing for the first, whose room is reserved
     };
     std::deque<OnWay> on_way{};  ///< sent but not acknowledged, if there is a window
   };
@@ -94,22 +99,28 @@ class Session {
   Answers on(const wire::Trigger& request);
   Answers on(const wire::Record& request);
   Answers on(const wire::AskHealth& request);
+  Answers on(const wire::KeepAlive&) { return {}; }
   template <class Answer>
   Answers on(const Answer& answer);
+  /// Why it may not; nothing if it may.
+  [[nodiscard]] std::optional<Error> refusal(bool is_granted, std::string_view what, std::string_view role) const;
   [[nodiscard]] bool usesSharedMemory() const;
   /// Of planes: the client's version of the protocol knows no later ones.
   [[nodiscard]] PlaneKind lastKindOfClient() const;
   Answers breakOff(std::uint64_t id, Error::Code code, std::string why);
-  Answers command(std::uint64_t id, const std::string& source, SourceHost::Command command);
-  /// What puts the answer to that request into the outbox.
-  SourceHost::Done owing(std::uint64_t id);
+  Answers command(std::uint64_t id, const std::string& source, std::string what, SourceHost::Command command);
+  /// What puts the answer to that request into the outbox, and tells who asked for it.
+  SourceHost::Done owing(std::uint64_t id, const std::string& source, std::string what);
   std::optional<Outgoing> nextOf(Subscriptions::iterator at);
 
   Hub& hub_;
+  const std::shared_ptr<Account> account_;  // shared with subscriptions, which may outlive this
   const Options options_;
   const std::function<void()> wake_;
   const std::shared_ptr<Outbox> outbox_;
   std::optional<wire::Hello> client_;
+  Subscribing who_;
+  Grants grants_{.view = true, .control = true, .record = true, .admin = true};
   bool is_over_ = false;
   std::set<std::uint64_t> open_;  ///< ids of requests whose answers are still to come
   Subscriptions subscriptions_;

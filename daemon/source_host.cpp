@@ -84,7 +84,13 @@ wire::SourceHealth SourceHost::health() const {
           .dropped_by_device = dropped_by_device_,
           .subscribers = static_cast<std::uint32_t>(subscribers_.size()),
           .reconnects = reconnects_,
-          .last_error = last_error_};
+          .last_error = last_error_,
+          .lockstep_by = lockstepHolder()};
+}
+
+std::vector<NamedTemperature> SourceHost::temperatures() const {
+  const std::scoped_lock lock{mutex_};
+  return temperatures_;
 }
 
 Result<> SourceHost::check(const Wish& wish) const {
@@ -145,6 +151,8 @@ void SourceHost::acknowledge(const SubscriberPtr& subscriber, std::uint64_t sequ
     const std::scoped_lock lock{mutex_};
     if (subscriber->unacknowledged != sequence) return;
     subscriber->unacknowledged.reset();
+    // What is being made now may have been begun without what it set before it acknowledged.
+    if (std::exchange(subscriber->is_passed_over, false)) subscriber->first_of_its_own = begun_ + 1;
   }
   work_.notify_all();
 }

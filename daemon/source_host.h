@@ -51,6 +51,8 @@ class SourceHost {
   /// Error Disconnected while the source has never been opened.
   [[nodiscard]] Result<wire::SourceDescription> describe() const;
   [[nodiscard]] wire::SourceHealth health() const;
+  /// Of the last frame.
+  [[nodiscard]] std::vector<NamedTemperature> temperatures() const;
   /// How long the source has been in one call of its driver.
   [[nodiscard]] std::chrono::nanoseconds inDriverFor(SteadyTime now) const;
 
@@ -109,6 +111,11 @@ class SourceHost {
   [[nodiscard]] bool isWanted() const;      // with the lock held
   [[nodiscard]] bool mayMakeFrame() const;  // with the lock held
   [[nodiscard]] bool hasLockstep() const;   // with the lock held
+  [[nodiscard]] bool isWaitedFor(const Subscriber& holder) const;          // with the lock held
+  [[nodiscard]] std::optional<SteadyTime> nextPassingOver() const;         // with the lock held
+  [[nodiscard]] std::optional<SteadyTime> paceOfOthers() const;            // with the lock held
+  void passOverTheLate();                                                  // with the lock held
+  [[nodiscard]] std::string lockstepHolder() const;                        // with the lock held
   template <class Call>
   auto inDriver(Call call) -> decltype(call());
 
@@ -140,7 +147,10 @@ class SourceHost {
   bool has_ended_ = false;
   bool is_stopping_ = false;
   std::uint64_t frames_ = 0;  ///< made so far: the sequence number of the next
+  std::uint64_t begun_ = 0;   ///< calls that make a frame so far
+  SteadyTime last_begun_{};   ///< when the last of them was made
   std::uint64_t dropped_by_device_ = 0;
+  std::vector<NamedTemperature> temperatures_;
   std::uint32_t reconnects_ = 0;
   std::string last_error_;
 

@@ -102,27 +102,24 @@ void SourceHost::adjustStreaming() {
 
 void SourceHost::makeFrameOrWait(const std::stop_token& stop) {
   std::unique_lock lock{mutex_};
-  if (mayMakeFrame()) {
+  passOverTheLate();
+  const bool may_make = mayMakeFrame();
+  const auto due = may_make ? paceOfOthers() : nextPassingOver();
+  const SteadyTime now = clock_.steady();
+  if (may_make && (!due || now >= *due)) {
     lock.unlock();
     return makeFrame(stop);
   }
-  work_.wait(lock, stop, [this] { return !commands_.empty() || mayMakeFrame() || !isWanted(); });
+  const auto has_changed = [&] {
+    return !commands_.empty() || mayMakeFrame() != may_make || !isWanted() ||
+           (may_make ? paceOfOthers() : nextPassingOver()) != due;
+  };
+  if (!due) return static_cast<void>(work_.wait(lock, stop, has_changed));
+  work_.wait_for(lock, stop, *due - now, has_changed);
 }
 
 bool SourceHost::isWanted() const {
   return !has_ended_ && (options_.always || !subscribers_.empty());
-}
-
-bool SourceHost::hasLockstep() const {
-  return std::ranges::any_of(subscribers_, [](const SubscriberPtr& subscriber) {
-    return subscriber->wish.backlog.policy == wire::Policy::Lockstep;
-  });
-}
-
-bool SourceHost::mayMakeFrame() const {
-  return isWanted() && std::ranges::none_of(subscribers_, [](const SubscriberPtr& subscriber) {
-           return subscriber->unacknowledged.has_value();
-         });
 }
 
 void SourceHost::runCommands() {
@@ -279,6 +276,8 @@ void SourceHost::makeFrame(const std::stop_token& stop) {
     interrupt = interrupt_.get_token();
     lockstep = hasLockstep();
     next_subscriber = next_subscriber_;
+    ++begun_;
+    last_begun_ = clock_.steady();
   }
   Result<Frame> frame = inDriver([&] { return source_->next(interrupt, lockstep); });
   {
@@ -317,13 +316,20 @@ void SourceHost::publish(Frame frame) {
     for (const Plane& plane : frame.planes) {
       pixel_bytes_[plane.kind] = sizeOf(plane.type) * static_cast<std::uint64_t>(plane.channels);
     }
+    temperatures_ = frame.moment.temperatures;
     frame.sequence = frames_++;
     dropped_by_device_ += frame.dropped_by_device;
     std::erase_if(subscribers_, [](const SubscriberPtr& one) { return one->backlog.hasEnded(); });
     for (const SubscriberPtr& subscriber : subscribers_) {
       if (!subscriber->backlog.wants(now)) continue;
       if (subscriber->wish.backlog.policy == wire::Policy::Lockstep) {
+        if (subscriber->is_passed_over || begun_ < subscriber->first_of_its_own) {
+          ++subscriber->missed;
+          continue;
+        }
+        if (subscriber->missed > 0) subscriber->backlog.miss(std::exchange(subscriber->missed, 0));
         subscriber->unacknowledged = frame.sequence;
+        subscriber->handed_out = now;
       }
       takers.push_back(subscriber);
     }

@@ -17,6 +17,7 @@ Result<PreparedFramePtr> prepare(const Frame& frame, const Selection& selection)
   for (const Plane& plane : prepared->frame.planes) bytes += plane.data.size();
   if (auto fits = checkFrameBytes(bytes); !fits) return fits.error();
   prepared->body = wire::layOutBody(prepared->frame.planes);
+  prepared->made_at = std::chrono::steady_clock::now();
   // Once here, so that a frame that cannot be sent says why to its subscribers and costs no connection.
   const auto sendable = wire::encode(wire::FrameMessage{0, prepared->frame}, prepared->body);
   if (!sendable) return Error{Error::Code::Internal, sendable.error().message};

@@ -1,18 +1,23 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
-#include <spdlog/sinks/stdout_sinks.h>
+#include <fcntl.h>
 #include <spdlog/spdlog.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
+#include <csignal>
 #include <cstdlib>
 #include <exception>
+#include <memory>
 #include <optional>
 #include <string>
 
 #include "daemon/config.h"
 #include "daemon/daemon.h"
 #include "daemon/memory.h"
+#include "daemon/own_output.h"
+#include "daemon/queued_sink.h"
 #include "drivers/logging.h"
 #include "protocol/types/counted.h"
 
@@ -59,15 +64,23 @@ int check(const Arguments& arguments) {
   return kOk;
 }
 
-int serve(const Arguments& arguments) {
+Result<> runDaemon(const Arguments& arguments, const std::shared_ptr<daemon::QueuedSink>& log) {
+  const daemon::OwnOutput of_libraries;
   auto started = daemon::Daemon::start({.config = arguments.config,
                                         .port = arguments.port,
                                         .socket = arguments.socket,
-                                        .handle_signals = true});
-  if (!started) return fail(started.error());
+                                        .handle_signals = true,
+                                        .log_lines_lost = [log] { return log->lost(); }});
+  if (!started) return started.error();
   (*started)->run();
   logging::info("stopped");
-  return kOk;
+  return {};
+}
+
+int serve(const Arguments& arguments, const std::shared_ptr<daemon::QueuedSink>& log) {
+  const Result<> ended = runDaemon(arguments, log);
+  log->finish();
+  return ended ? kOk : fail(ended.error());
 }
 
 /// As many files as the administrator allows: each client is one, and frames in shared memory are, on
@@ -79,14 +92,15 @@ void raiseFileLimit() {
   if (::setrlimit(RLIMIT_NOFILE, &files) != 0) logging::debug("the limit of open files stays");
 }
 
-/// To standard error; without the time where the journal adds it.
-void setUpLog() {
-  auto log = spdlog::stderr_logger_mt("toftwind");
-  const bool is_journal =
-      std::getenv("JOURNAL_STREAM") != nullptr;  // NOLINT(concurrency-mt-unsafe)
-  log->set_pattern(is_journal ? "%l: %v" : "%Y-%m-%d %H:%M:%S.%e %l: %v");
-  log->flush_on(spdlog::level::info);
+/// To the journal, or to standard error as it is now, whatever becomes of it; nobody who logs waits for either.
+std::shared_ptr<daemon::QueuedSink> setUpLog() {
+  const int error = ::fcntl(STDERR_FILENO, F_DUPFD_CLOEXEC, 3);
+  const bool is_journal = daemon::isJournal(STDERR_FILENO);
+  auto sink = std::make_shared<daemon::QueuedSink>(is_journal ? daemon::toJournal(error) : daemon::toDescriptor(error));
+  auto log = std::make_shared<spdlog::logger>("toftwind", sink);
+  log->set_pattern(is_journal ? "%v" : "%Y-%m-%d %H:%M:%S.%e %l: %v");
   spdlog::set_default_logger(std::move(log));
+  return sink;
 }
 
 int run(int argc, char** argv) {
@@ -113,15 +127,19 @@ int run(int argc, char** argv) {
     fmt::print("{}", daemon::documentConfig(drivers::allDrivers()));
     return kOk;
   }
-  setUpLog();
+  const auto log = setUpLog();
   raiseFileLimit();
-  return arguments.only_check ? check(arguments) : serve(arguments);
+  if (!arguments.only_check) return serve(arguments, log);
+  const int checked = check(arguments);
+  log->finish();
+  return checked;
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   daemon::keepFreedMemory();
+  ::signal(SIGPIPE, SIG_IGN);  // whoever writes to what is closed is told so
   // Where our plug-in for OpenNI2 is installed, the driver openni2 would show a daemon its own sources.
   ::setenv("TOFTWIN_OPENNI2", "off", 1);  // NOLINT(concurrency-mt-unsafe): there is no other thread yet
   try {

@@ -10,14 +10,25 @@
 #include <functional>
 #include <memory>
 
+#include "daemon/networks.h"
+
 namespace toftwin::daemon {
 
-/// Takes connections one after another. Where accept(2) fails, for want of file descriptors say, it waits a
+/// Where connections come in, and whose are taken.
+struct Listening {
+  Listening(boost::asio::ip::tcp::acceptor of, Networks whose = {})  // NOLINT(google-explicit-constructor)
+      : acceptor(std::move(of)), allowed(std::move(whose)) {}
+  boost::asio::ip::tcp::acceptor acceptor;
+  Networks allowed;
+};
+
+/// Takes connections one after another; those of others than are allowed are closed. Where accept(2) fails, for want of file descriptors say, it waits a
 /// moment instead of failing at full speed. Used on the acceptor's thread only.
 class Accepting {
  public:
-  Accepting(boost::asio::ip::tcp::acceptor acceptor, std::function<void(boost::asio::ip::tcp::socket)> take)
-      : acceptor_(std::move(acceptor)),
+  Accepting(Listening listening, std::function<void(boost::asio::ip::tcp::socket)> take)
+      : acceptor_(std::move(listening.acceptor)),
+        allowed_(std::move(listening.allowed)),
         pause_(acceptor_.get_executor()),
         port_(acceptor_.local_endpoint().port()),
         take_(std::move(take)) {
@@ -38,7 +49,8 @@ class Accepting {
             bool has_failed;
             ~GoOn() { has_failed ? accepting.nextAfterAWhile() : accepting.next(); }
           } const go_on{*this, static_cast<bool>(error)};
-          if (!error) take_(std::move(socket));
+          boost::system::error_code is_gone;
+          if (!error && allowed_.admit(socket.remote_endpoint(is_gone).address())) take_(std::move(socket));
         });
   }
   void nextAfterAWhile() {
@@ -49,6 +61,7 @@ class Accepting {
   }
 
   boost::asio::ip::tcp::acceptor acceptor_;
+  const Networks allowed_;
   boost::asio::steady_timer pause_;
   const std::uint16_t port_;
   const std::function<void(boost::asio::ip::tcp::socket)> take_;

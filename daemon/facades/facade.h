@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include <toftwin/result.h>
 #include <toftwin/units.h>
@@ -24,6 +25,7 @@ struct FacadeKeys {
   std::string source;
   std::string address = "127.0.0.1";
   bool allow_remote = false;
+  std::vector<std::string> allow;
   std::string intervals;
   Duration latency = 0_s;
   Duration boot_time = 0_s;
@@ -37,6 +39,9 @@ struct FacadeKeys {
            "allows an address that other machines reach. Whatever the language is, it has no encryption and "
            "at most a password in clear text: everyone who reaches the ports sees the source and can set it. "
            "Only for a network that you trust whole");
+    v.texts("allow", allow,
+            "whose connections are taken, addresses and networks (\"10.0.0.0/24\"); of this machine always, of others none if "
+            "there are some. Of the kinds over TCP, and gige_vision's commands; an address can be forged within a network");
     v.text("intervals", intervals,
            "a file with the intervals between a real camera's frames, one number in milliseconds per line, "
            "relative to this file: frames leave as unevenly as those; empty: as they come");

@@ -34,16 +34,20 @@ void warnIfRemote(const FacadeKeys& keys) {
   const auto address = boost::asio::ip::make_address(keys.address, is_none);
   if (is_none || address.is_loopback()) return;
   logging::warn(
-      "{} listens on {}, which other machines reach: everyone there can see the camera and set it, because "
+      "{} listens on {}, which other machines reach: {} can see the camera and set it, because "
       "its language has no encryption and at most a password in clear text",
-      nameOf(keys), keys.address);
+      nameOf(keys), keys.address, keys.allow.empty() ? "everyone there" : "whoever has an address that `allow` names");
 }
 
 }  // namespace
 
-Result<boost::asio::ip::tcp::acceptor> listenFor(boost::asio::io_context& io, const FacadeKeys& keys,
-                                                 std::uint16_t port, std::string_view key) {
-  return listenTcp(io, keys.address, port, fmt::format("the facade's {}", key));
+Result<Listening> listenFor(boost::asio::io_context& io, const FacadeKeys& keys, std::uint16_t port,
+                            std::string_view key) {
+  auto allowed = Networks::read(keys.allow);
+  if (!allowed) return allowed.error();
+  auto acceptor = listenTcp(io, keys.address, port, fmt::format("the facade's {}", key));
+  if (!acceptor) return acceptor.error();
+  return Listening{*std::move(acceptor), *std::move(allowed)};
 }
 
 void Facades::apply(std::vector<ConfiguredFacade> configured) {

@@ -18,6 +18,7 @@ constexpr std::chrono::milliseconds kLinkPause{200};
 
 SourceLink::SourceLink(EventThread& thread, const FacadePlace& place, Wants wants, TakeFrame take)
     : hub_(place.hub),
+      account_(place.hub.clientAccount()),
       source_(place.keys.source),
       wants_(std::move(wants)),
       take_(std::move(take)),
@@ -104,7 +105,8 @@ Result<SubscriberPtr> SourceLink::subscribeTo(SourceHost& host) {
   wish.backlog = {.policy = wire::Policy::Queue,
                   .depth = wants_.queue,
                   .byte_limit = hub_.options().backlog_bytes,
-                  .budget = hub_.budget()};
+                  .account = account_};
+  wish.who.name = wish.who.text = fmt::format("a facade of {}", source_);
   return host.subscribe(std::move(wish), [this, door = door_, alive = is_alive_] {
     door->post([this, alive] {
       if (*alive) takeAll();

@@ -56,6 +56,7 @@ class SourceLink {
   [[nodiscard]] Done onThread(Done done) const;
 
   Hub& hub_;
+  const std::shared_ptr<Account> account_;  // shared with subscriptions, which may outlive this
   const std::string source_;
   const Wants wants_;
   const TakeFrame take_;

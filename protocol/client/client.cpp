@@ -233,7 +233,8 @@ Result<DaemonHealth> Client::health() {
   DaemonHealth health{state_->connection->software(), answer->uptime, answer->sessions, {}, {}};
   for (auto& s : answer->sources) {
     health.sources.push_back({std::move(s.name), s.streaming, s.frames, s.dropped_by_device,
-                              s.subscribers, s.reconnects, std::move(s.last_error)});
+                              s.subscribers, s.reconnects, std::move(s.last_error), std::move(s.lockstep_by),
+                              std::move(s.recording_by)});
   }
   for (auto& f : answer->facades) {
     health.facades.push_back({std::move(f.kind), std::move(f.source), std::move(f.place), f.state, f.clients,

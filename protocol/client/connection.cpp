@@ -34,8 +34,10 @@ Result<std::shared_ptr<Connection>> Connection::open(const transport::Address& a
   wire::Limits limits;
   limits.body_bytes = options.max_message_bytes;
   connection->socket_.emplace(std::move(*socket), limits);
+  if (auto encrypted = connection->encrypt(); !encrypted) return encrypted.error();
   if (auto greeted = connection->greet(); !greeted) return greeted.error();
   connection->readOn();
+  connection->keepAlive();
   connection->thread_ = std::thread{[state = connection.get()] {
     const auto stay = asio::make_work_guard(state->io_);  // until stop(), even when disconnected
     state->io_.restart();
@@ -55,6 +57,30 @@ void Connection::stop() {
   thread_.join();
 }
 
+/// Where the address says so; in the caller's thread, like the greeting.
+Result<> Connection::encrypt() {
+  const auto* tcp = std::get_if<transport::TcpAddress>(&address_);
+  if (tcp == nullptr || !tcp->is_encrypted) return {};
+  const auto context =
+      transport::TlsContext::forClient({options_.certificate, options_.key, options_.authorities});
+  if (!context) return context.error();
+  std::optional<Result<>> agreed;
+  socket_->asyncEncrypt(*context, tcp->host, [&](Result<> result) { agreed = std::move(result); });
+  const auto deadline = std::chrono::steady_clock::now() + options_.timeout;
+  io_.restart();
+  while (!agreed && io_.run_one_until(deadline) > 0) {
+  }
+  if (!agreed) {
+    socket_->close();  // ends the handshake, whose handler refers to `agreed`
+    io_.restart();
+    io_.run();
+    agreed = Error{Error::Code::Timeout, "no TLS within " + milliseconds(options_.timeout)};
+  }
+  if (*agreed) return {};
+  return Error{agreed->error().code, transport::toString(address_) + ": " + agreed->error().message +
+                                         ". Does the daemon have a certificate of an authority that is trusted here?"};
+}
+
 /// Says Hello and waits for the daemon's; in the caller's thread, before the own one starts.
 Result<> Connection::greet() {
   std::vector<std::string> features;
@@ -63,7 +89,11 @@ Result<> Connection::greet() {
     socket_->acceptSharedBodies();
   }
   std::optional<Result<wire::Message>> answer;
-  enqueue(*wire::encode(wire::Hello{next_id_++, kSoftware, features}));
+  wire::Hello own{next_id_++, kSoftware, features};
+  own.token = options_.token;
+  auto encoded = wire::encode(own);
+  if (!encoded) return encoded.error();
+  enqueue(*std::move(encoded));
   socket_->asyncRead([&](Result<wire::Message> message) { answer = std::move(message); });
   const auto deadline = std::chrono::steady_clock::now() + options_.timeout;
   io_.restart();
@@ -83,6 +113,7 @@ Result<> Connection::greet() {
   if (!hello) return Error{Error::Code::Malformed, where + ": the first message was not a Hello"};
   software_ = hello->software;
   minor_ = hello->minor;
+  idle_ = hello->idle;
   return {};
 }
 
@@ -187,6 +218,18 @@ void Connection::readOn() {
   });
 }
 
+/// Says that this client lives, whatever its application does, three times within what the daemon waits.
+void Connection::keepAlive() {
+  if (!idle_ || minor_ < wire::kFirstMinorWithKeepAlive || fault_) return;
+  const std::chrono::duration<double> period{std::clamp(idle_->in(second) / 3.0, 0.05, 3600.0)};
+  keep_alive_.expires_after(std::chrono::duration_cast<std::chrono::steady_clock::duration>(period));
+  keep_alive_.async_wait([this](boost::system::error_code cancelled) {
+    if (cancelled || fault_) return;
+    enqueue(*wire::encode(wire::KeepAlive{}));
+    keepAlive();
+  });
+}
+
 void Connection::take(wire::Message message) {
   std::visit(
       [this](auto& m) {
@@ -250,6 +293,7 @@ void Connection::fail(const Error& reason) {
       is_ours ? reason
               : Error{reason.code, where + reason.message + ". Is it still running? Connect again"};
   socket_->close();
+  keep_alive_.cancel();
   output_.clear();
   for (const auto& [id, answered] : std::exchange(waiting_, {})) answered->set_value(*fault_);
   for (const auto& [id, frames] : std::exchange(running_, {})) frames->end(*fault_);

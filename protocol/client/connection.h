@@ -4,6 +4,7 @@
 #include <utility>  // before asio: Boost 1.74 uses std::exchange without it
 
 #include <boost/asio/io_context.hpp>
+#include <boost/asio/steady_timer.hpp>
 
 #include <atomic>
 #include <chrono>
@@ -75,6 +76,7 @@ class Connection {
 
   using Answered = std::promise<Result<wire::Message>>;
   [[nodiscard]] Error unexpectedAnswer() const;
+  Result<> encrypt();
   Result<> greet();
   Result<wire::Message> exchange(std::uint64_t id, wire::Message request);
   void send(wire::Message message);
@@ -83,6 +85,7 @@ class Connection {
   void enqueue(wire::Encoded message);
   void writeNext();
   void readOn();
+  void keepAlive();
   void take(wire::Message message);
   void takeFrame(wire::FrameMessage message);
   void takeAnswer(std::uint64_t id, wire::Message answer);
@@ -92,10 +95,12 @@ class Connection {
   const ClientOptions options_;
   std::string software_;
   std::uint16_t minor_ = 0;  ///< of the daemon's version of the protocol
+  std::optional<Duration> idle_;  ///< silence after which the daemon lets this client go
   std::atomic<std::uint64_t> next_id_{1};
 
   boost::asio::io_context io_;
   std::optional<transport::FramedSocket> socket_;
+  boost::asio::steady_timer keep_alive_{io_};
   std::deque<wire::Encoded> output_;
   bool writing_ = false;
   std::optional<Error> fault_;

@@ -87,6 +87,19 @@ Result<std::uint64_t> OutputFile::freeBytes() const {
   return std::uint64_t{disk.f_bavail} * disk.f_frsize;
 }
 
+Result<> OutputFile::sync() {
+  if (::fdatasync(fd_) != 0 && errno != EINVAL) return systemError(path_, "write to the disk", errno);
+  if (is_in_folder_) return {};
+  const auto folder = path_.has_parent_path() ? path_.parent_path() : std::filesystem::path{"."};
+  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (fd < 0) return systemError(folder, "open this folder", errno);
+  const int number = ::fsync(fd) != 0 && errno != EINVAL ? errno : 0;
+  ::close(fd);
+  if (number != 0) return systemError(folder, "write to the disk", number);
+  is_in_folder_ = true;
+  return {};
+}
+
 Result<> OutputFile::close() {
   const int fd = std::exchange(fd_, -1);
   if (fd < 0) return {};

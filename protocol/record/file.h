@@ -26,6 +26,8 @@ class OutputFile {
   /// All of the bytes or none. Error StorageFull where the disk, the quota or a limit is at its
   /// end.
   Result<> append(std::span<const std::byte> bytes);
+  /// Waits until all that was appended is on the disk, with the file's name in its folder.
+  Result<> sync();
   /// Waits until the bytes are on the disk, and closes.
   Result<> close();
   [[nodiscard]] std::uint64_t size() const { return size_; }
@@ -38,6 +40,7 @@ class OutputFile {
   int fd_ = -1;
   std::uint64_t size_ = 0;
   std::filesystem::path path_;
+  bool is_in_folder_ = false;  ///< for certain, after a power cut, too
 };
 
 /// A file for reading at any place; its size is that at opening.

@@ -81,7 +81,8 @@ bool FileWriter::openChunkIsDue(std::uint64_t log_time_ns) const {
   // the next one comes.
   const bool slow =
       messages() > 1 && log_time_ns > previous_ns_ && log_time_ns - previous_ns_ >= most;
-  return open_.size() >= options_.chunk_bytes || open_end_ns_ - open_start_ns_ >= most || slow;
+  const bool is_first = options_.first_frame_at_once && messages() == 1;
+  return is_first || open_.size() >= options_.chunk_bytes || open_end_ns_ - open_start_ns_ >= most || slow;
 }
 
 /// Upper bounds of the records' sizes (opcode and length included), by mcap.dev/spec.
@@ -131,7 +132,11 @@ Result<> FileWriter::finishChunk() {
   }
   index.message_index_length = records.size() - index.length;
 
-  const Result<> wrote = append(records);
+  Result<> wrote = append(records);
+  if (wrote && options_.sync_chunks) {
+    wrote = file_.sync();
+    if (!wrote) failed_ = wrote.error();
+  }
   if (wrote) {
     count(head);
     chunks_.push_back(std::move(index));

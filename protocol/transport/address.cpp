@@ -12,7 +12,7 @@ constexpr std::size_t kMaxUnixPath = 107;  // sockaddr_un::sun_path less its clo
 Error invalid(std::string_view address, const std::string& what) {
   return {Error::Code::InvalidArgument,
           "address \"" + std::string{address} + "\": " + what +
-              "; write \"tcp:host:port\", \"host:port\" or \"unix:/path\""};
+              "; write \"tcp:host:port\", \"host:port\", \"tls:host:port\" or \"unix:/path\""};
 }
 
 std::optional<std::uint16_t> toPort(std::string_view digits) {
@@ -58,6 +58,11 @@ Result<Address> parseTcp(std::string_view whole, std::string_view text,
 
 Result<Address> parseAddress(std::string_view text, std::uint16_t default_port) {
   if (text.starts_with("unix:")) return parseUnix(text, text.substr(5));
+  if (text.starts_with("tls:")) {
+    auto address = parseTcp(text, text.substr(4), default_port);
+    if (address) std::get<TcpAddress>(*address).is_encrypted = true;
+    return address;
+  }
   if (text.starts_with("tcp:")) return parseTcp(text, text.substr(4), default_port);
   return parseTcp(text, text, default_port);
 }
@@ -66,7 +71,7 @@ std::string toString(const Address& address) {
   if (const auto* local = std::get_if<UnixAddress>(&address)) return "unix:" + local->path;
   const auto& tcp = std::get<TcpAddress>(address);
   const bool is_ipv6 = tcp.host.find(':') != std::string::npos;
-  return "tcp:" + (is_ipv6 ? "[" + tcp.host + "]" : tcp.host) + ":" + std::to_string(tcp.port);
+  return (tcp.is_encrypted ? "tls:" : "tcp:") + (is_ipv6 ? "[" + tcp.host + "]" : tcp.host) + ":" + std::to_string(tcp.port);
 }
 
 }  // namespace toftwin::transport

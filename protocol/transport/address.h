@@ -13,6 +13,7 @@ namespace toftwin::transport {
 struct TcpAddress {
   std::string host;
   std::uint16_t port = 0;
+  bool is_encrypted = false;  ///< by TLS
   bool operator==(const TcpAddress&) const = default;
 };
 struct UnixAddress {
@@ -21,7 +22,7 @@ struct UnixAddress {
 };
 using Address = std::variant<TcpAddress, UnixAddress>;
 
-/// Reads "tcp:host:port", "host:port", "[::1]:port" (each with or without ":port", then it is
+/// Reads "tls:host:port", "tcp:host:port", "host:port", "[::1]:port" (each with or without ":port", then it is
 /// `default_port`) or "unix:/path".
 Result<Address> parseAddress(std::string_view text, std::uint16_t default_port);
 /// The address as `parseAddress` reads it.

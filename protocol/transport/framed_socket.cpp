@@ -6,12 +6,15 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
+#include <boost/asio/ssl/host_name_verification.hpp>
+#include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/write.hpp>
 
 #include <algorithm>
 #include <cerrno>
 #include <cstring>
 
+#include "protocol/transport/tls_context.h"
 #include "protocol/wire/crc32c.h"
 
 namespace toftwin::transport {
@@ -43,8 +46,56 @@ union Control {
 
 }  // namespace
 
+struct FramedSocket::Tls {
+  Tls(Socket& socket, std::shared_ptr<const TlsContext> of, asio::ssl::context& ssl)
+      : context(std::move(of)), stream(socket, ssl) {}
+  std::shared_ptr<const TlsContext> context;  // shared with the other connections
+  asio::ssl::stream<Socket&> stream;
+};
+
 FramedSocket::FramedSocket(Socket socket, wire::Limits limits)
     : socket_(std::move(socket)), limits_(limits), input_(kInput) {}
+
+FramedSocket::~FramedSocket() = default;
+
+void FramedSocket::asyncEncrypt(std::shared_ptr<const TlsContext> context, const std::string& host,
+                                WriteHandler handler) {
+  const bool is_server = context->state_->is_server;
+  asio::ssl::context& ssl = context->state_->context;
+  tls_ = std::make_unique<Tls>(socket_, std::move(context), ssl);
+  if (!is_server) {
+    error_code ignored;
+    tls_->stream.set_verify_callback(asio::ssl::host_name_verification{host}, ignored);
+  }
+  const auto side = is_server ? asio::ssl::stream_base::server : asio::ssl::stream_base::client;
+  tls_->stream.async_handshake(side, [handler = std::move(handler)](error_code fault) {
+    if (!fault) return handler({});
+    const bool is_gone = fault == asio::error::eof || fault.category() == boost::system::system_category();
+    handler(Error{is_gone ? Error::Code::Disconnected : Error::Code::PermissionDenied,
+                  "TLS could not be agreed on: " + fault.message()});
+  });
+}
+
+std::string FramedSocket::certifiedName() const {
+  if (!tls_) return {};
+  SSL* const ssl = tls_->stream.native_handle();
+  X509* const certificate = ::SSL_get1_peer_certificate(ssl);
+  if (certificate == nullptr) return {};
+  std::string name;
+  if (::SSL_get_verify_result(ssl) == X509_V_OK) {
+    char text[256] = {};
+    const int size = ::X509_NAME_get_text_by_NID(::X509_get_subject_name(certificate), NID_commonName, text, sizeof text);
+    if (size > 0) name.assign(text, static_cast<std::size_t>(size));
+  }
+  ::X509_free(certificate);
+  return name;
+}
+
+template <class Buffers, class Handler>
+void FramedSocket::readSome(const Buffers& buffers, Handler handler) {
+  if (tls_) return tls_->stream.async_read_some(buffers, std::move(handler));
+  socket_.async_read_some(buffers, std::move(handler));
+}
 
 bool FramedSocket::isLocal() const {
   error_code fault;
@@ -52,7 +103,7 @@ bool FramedSocket::isLocal() const {
 }
 
 void FramedSocket::close() {
-  error_code ignored;  // a connection that is gone already is closed as well
+  error_code ignored;  // a connection that is gone already is closed as well; under TLS lengths tell what is whole
   socket_.shutdown(Socket::shutdown_both, ignored);
   socket_.close(ignored);
 }
@@ -72,7 +123,7 @@ void FramedSocket::fill(std::size_t wanted, Step next, ReadHandler handler) {
   if (filled_ >= wanted) return (this->*next)(std::move(handler));
   if (input_.size() < wanted) input_.resize(wanted);
   if (accepts_shared_bodies_) return fillWithDescriptors(wanted, next, std::move(handler));
-  socket_.async_read_some(asio::buffer(input_) + filled_,
+  readSome(asio::buffer(input_) + filled_,
                           [this, wanted, next, handler = std::move(handler)](
                               error_code fault, std::size_t count) mutable {
                             if (fault) return handler(disconnected(fault));
@@ -182,7 +233,7 @@ void FramedSocket::takeRest(Arriving arriving, ReadHandler handler) {
   if (left == 0) return finish(arriving.body.buffer(), arriving.crc32c, handler);
   std::byte* const part = arriving.body.bytes.get() + arriving.filled;
   const auto room = asio::buffer(part, std::min(left, kPart));
-  socket_.async_read_some(
+  readSome(
       room, [this, part, arriving = std::move(arriving), handler = std::move(handler)](
                 error_code fault, std::size_t count) mutable {
         if (fault) return handler(disconnected(fault));
@@ -196,7 +247,7 @@ void FramedSocket::takeRest(Arriving arriving, ReadHandler handler) {
 /// machine spends as much time with waking its receivers as with copying. At the stream's end, and when
 /// the receive window is full, it wakes in any case.
 void FramedSocket::wakeWith(std::size_t bytes) {
-  if (bytes == wakes_with_) return;
+  if (bytes == wakes_with_ || tls_) return;  // encrypted, nobody knows how many bytes come
   wakes_with_ = bytes;
   error_code ignored;
   socket_.set_option(asio::socket_base::receive_low_watermark{static_cast<int>(bytes)}, ignored);
@@ -274,10 +325,14 @@ void FramedSocket::writeRest(std::size_t head_sent, WriteHandler handler) {
       buffers.emplace_back(piece.bytes().data(), piece.size());
     }
   }
-  asio::async_write(socket_, buffers, untilDone,
-                    [this, handler = std::move(handler)](error_code fault, std::size_t) {
-                      wrote(fault ? Result<>{disconnected(fault)} : Result<>{}, handler);
-                    });
+  const auto done = [this, handler = std::move(handler)](error_code fault, std::size_t) {
+    wrote(fault ? Result<>{disconnected(fault)} : Result<>{}, handler);
+  };
+  if (tls_) {
+    asio::async_write(tls_->stream, buffers, done);
+  } else {
+    asio::async_write(socket_, buffers, untilDone, done);
+  }
 }
 
 void FramedSocket::wrote(Result<> result, const WriteHandler& handler) {

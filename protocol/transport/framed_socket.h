@@ -10,12 +10,14 @@
 #include <deque>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include <toftwin/result.h>
 
 #include "protocol/transport/buffer_pool.h"
 #include "protocol/transport/memfd.h"
+#include "protocol/transport/tls.h"
 #include "protocol/wire/codec.h"
 
 namespace toftwin::transport {
@@ -34,6 +36,15 @@ class FramedSocket {
 
   /// What a peer announces is checked against `limits` before anything is allocated.
   explicit FramedSocket(Socket socket, wire::Limits limits = {});
+  ~FramedSocket();
+  FramedSocket(FramedSocket&&) = delete;
+  FramedSocket& operator=(FramedSocket&&) = delete;
+
+  /// Before anything is read or written: agrees on keys with the peer, and looks at its certificate. A client names the
+  /// `host` that the daemon's must be of. Error PermissionDenied: whoever it is, is not trusted.
+  void asyncEncrypt(std::shared_ptr<const TlsContext> context, const std::string& host, WriteHandler handler);
+  /// The common name in the peer's certificate, which was checked; empty if it showed none.
+  [[nodiscard]] std::string certifiedName() const;
 
   /// Waits for the next message. Errors: Disconnected (the peer closed or the connection broke);
   /// Unsupported (a message of unknown kind was skipped: answer `refusedRequest` and read on); all
@@ -79,9 +90,13 @@ class FramedSocket {
 
   void sendDescriptor(WriteHandler handler);
   void writeRest(std::size_t head_sent, WriteHandler handler);
+  template <class Buffers, class Handler>
+  void readSome(const Buffers& buffers, Handler handler);
   void wrote(Result<> result, const WriteHandler& handler);
 
   Socket socket_;
+  struct Tls;
+  std::unique_ptr<Tls> tls_;  ///< null: in clear text. Refers to the socket
   wire::Limits limits_;
   bool accepts_shared_bodies_ = false;
 

@@ -64,7 +64,10 @@ std::vector<Parameter> readParameters(
 // One `read` for each message.
 
 Hello read(Checks& checks, std::uint64_t id, const fb::Hello& t) {
-  return {id, checks.name(t.software(), "software"), checks.names(t.features(), "features")};
+  Hello hello{id, checks.name(t.software(), "software"), checks.names(t.features(), "features")};
+  hello.token = checks.text(t.token(), kMaxText, "token");
+  if (t.idle_s()) hello.idle = checks.finiteFromZero(*t.idle_s(), "idle_s") * second;
+  return hello;
 }
 ListSources read(Checks&, std::uint64_t id, const fb::ListSources&) { return {id}; }
 SourceList read(Checks& checks, std::uint64_t id, const fb::SourceList& t) {
@@ -156,7 +159,9 @@ Health read(Checks& checks, std::uint64_t id, const fb::Health& t) {
          .dropped_by_device = s->dropped_by_device(),
          .subscribers = s->subscribers(),
          .reconnects = s->reconnects(),
-         .last_error = checks.text(s->last_error(), kMaxText, "source.last_error")});
+         .last_error = checks.text(s->last_error(), kMaxText, "source.last_error"),
+         .lockstep_by = checks.text(s->lockstep_by(), kMaxText, "source.lockstep_by"),
+         .recording_by = checks.text(s->recording_by(), kMaxText, "source.recording_by")});
   }
   for (const auto* f : checks.items(t.facades(), kMaxSources, "facades")) {
     m.facades.push_back({.kind = checks.name(f->kind(), "facade.kind"),
@@ -171,6 +176,7 @@ Health read(Checks& checks, std::uint64_t id, const fb::Health& t) {
 Failure read(Checks& checks, std::uint64_t id, const fb::Failure& t) {
   return {id, readError(checks, t.error())};
 }
+KeepAlive read(Checks&, std::uint64_t, const fb::KeepAlive&) { return {}; }
 
 template <class Table>
 Message readAs(Checks& checks, const fb::Header& header) {
@@ -186,7 +192,7 @@ constexpr std::array<ReadMessage, std::variant_size_v<Message>> kReaders{
     readAs<fb::Acknowledge>,    readAs<fb::SubscriptionEnded>, readAs<fb::SetPose>,
     readAs<fb::SetParameter>,   readAs<fb::Trigger>,           readAs<fb::Record>,
     readAs<fb::Done>,           readAs<fb::AskHealth>,         readAs<fb::Health>,
-    readAs<fb::Failure>};
+    readAs<fb::Failure>,        readAs<fb::KeepAlive>};
 static_assert(static_cast<std::size_t>(fb::Body::MAX) == kReaders.size());
 
 /// FlatBuffers reads numbers where they lie, so the header must start at a multiple of eight.

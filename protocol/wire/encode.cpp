@@ -65,11 +65,19 @@ Offset<flatbuffers::Vector<std::uint8_t>> writeKinds(Builder& builder,
   return builder.CreateVector(bytes);
 }
 
+/// What older versions lack is absent where it is empty, so that the bytes stay what they were.
+Offset<flatbuffers::String> writeIfAny(Builder& builder, const std::string& text) {
+  return text.empty() ? Offset<flatbuffers::String>{} : writeText(builder, text);
+}
+
 // One `write` for each message; the table's name in the schema is the message's.
 
 auto write(Builder& b, const Hello& m) {
   const auto software = writeName(b, m.software);
-  return fb::CreateHello(b, software, writeNames(b, m.features));
+  const auto features = writeNames(b, m.features);
+  flatbuffers::Optional<double> idle_s = flatbuffers::nullopt;
+  if (m.idle) idle_s = m.idle->in(second);
+  return fb::CreateHello(b, software, features, writeIfAny(b, m.token), idle_s);
 }
 auto write(Builder& b, const ListSources&) { return fb::CreateListSources(b); }
 auto write(Builder& b, const SourceList& m) {
@@ -149,8 +157,10 @@ auto write(Builder& b, const Health& m) {
     const SourceHealth& s = m.sources[i];
     const auto name = writeName(b, s.name);
     const auto last_error = writeText(b, s.last_error);
-    sources.push_back(fb::CreateSourceHealth(b, name, s.streaming, s.frames, s.dropped_by_device,
-                                             s.subscribers, s.reconnects, last_error));
+    const auto lockstep_by = writeIfAny(b, s.lockstep_by);
+    const auto recording_by = writeIfAny(b, s.recording_by);
+    sources.push_back(fb::CreateSourceHealth(b, name, s.streaming, s.frames, s.dropped_by_device, s.subscribers,
+                                             s.reconnects, last_error, lockstep_by, recording_by));
   }
   std::vector<Offset<fb::FacadeHealth>> facades;
   for (std::size_t i = 0; i < countOf(m.facades, kMaxSources); ++i) {
@@ -167,6 +177,7 @@ auto write(Builder& b, const Health& m) {
                           b.CreateVector(facades));
 }
 auto write(Builder& b, const Failure& m) { return fb::CreateFailure(b, writeError(b, m.error)); }
+auto write(Builder& b, const KeepAlive&) { return fb::CreateKeepAlive(b); }
 
 Error tooLargeToSend(const std::string& part, std::uint64_t bytes, std::uint64_t limit) {
   return {Error::Code::TooLarge, "this message cannot be sent: its " + part + " has " +

@@ -17,10 +17,12 @@
 namespace toftwin::wire {
 
 inline constexpr std::uint16_t kVersionMajor = 1;
-inline constexpr std::uint16_t kVersionMinor = 3;
+inline constexpr std::uint16_t kVersionMinor = 4;
 
 /// Peers of an older minor version know parameters that are numbers, and no others.
 inline constexpr std::uint16_t kFirstMinorWithTexts = 3;
+/// Peers of an older minor version know no KeepAlive: their silence says nothing.
+inline constexpr std::uint16_t kFirstMinorWithKeepAlive = 4;
 
 /// The last kind of plane that a peer of this minor version knows: others must not be sent to it.
 constexpr PlaneKind lastPlaneKindOf(std::uint16_t minor) {
@@ -33,6 +35,8 @@ struct Hello {
   std::string software;               ///< "toftwind 0.1.0"
   std::vector<std::string> features;  ///< optional parts of the protocol that this side speaks
   std::uint16_t minor = kVersionMinor;  ///< of the sender, from the preamble; written, it is this side's
+  std::string token{};                  ///< a client's: says who it is; empty: it has none
+  std::optional<Duration> idle{};       ///< a daemon's: whoever is silent for so long is let go
 };
 
 struct ListSources { std::uint64_t id = 0; };
@@ -125,6 +129,8 @@ struct SourceHealth {
   std::uint32_t subscribers = 0;
   std::uint32_t reconnects = 0;
   std::string last_error;
+  std::string lockstep_by{};   ///< for people: who holds the source in lockstep; empty: nobody
+  std::string recording_by{};  ///< for people: whose recording it is being made; empty: nobody's
 };
 struct FacadeHealth {
   std::string kind;
@@ -146,8 +152,12 @@ struct Health {
 /// is closed after it).
 struct Failure { std::uint64_t id = 0; Error error; };
 
+/// A client that has nothing else to say is still there. No answer.
+struct KeepAlive {};
+
 using Message = std::variant<Hello, ListSources, SourceList, DescribeSource, SourceDescription, Subscribe,
                              Subscribed, Unsubscribe, FrameMessage, Acknowledge, SubscriptionEnded,
-                             SetPose, SetParameter, Trigger, Record, Done, AskHealth, Health, Failure>;
+                             SetPose, SetParameter, Trigger, Record, Done, AskHealth, Health, Failure,
+                             KeepAlive>;
 
 }  // namespace toftwin::wire

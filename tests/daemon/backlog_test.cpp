@@ -56,8 +56,8 @@ TEST(Backlog, QueueDropsTheOldestAndCountsThemOnce) {
   EXPECT_EQ(delivered(backlog).dropped_before, 0u);
 }
 
-TEST(Backlog, LosslessEndsWithOverrunAfterAllThatWaited) {
-  Backlog backlog = backlogWith({.policy = Policy::Lossless, .byte_limit = 3 * kHeld});
+TEST(Backlog, LosslessEndsWithOverrunAtItsLimit) {
+  Backlog backlog = backlogWith({.policy = Policy::Lossless, .byte_limit = 3 * kHeld, .keeps_at_overrun = true});
   for (std::uint64_t i = 0; i < 10; ++i) backlog.push(frameNumber(i));
   for (std::uint64_t i = 0; i < 3; ++i) {
     const auto next = delivered(backlog);
@@ -110,41 +110,120 @@ TEST(Backlog, AFrameThatALosslessSubscriberCanNeverHoldEndsItAndSaysSo) {
       << end.message;
 }
 
-TEST(Backlog, AllTogetherHoldNoMoreThanTheBudget) {
-  const auto budget = std::make_shared<Budget>(4 * kHeld);
-  const Backlog::Settings queue{.policy = Policy::Queue, .depth = 100, .budget = budget};
-  const Backlog::Settings lossless{.policy = Policy::Lossless, .budget = budget};
-  auto reserved = Backlog::reserve(queue, frameNumber(0)->body.bytes);
-  ASSERT_TRUE(reserved.ok());
-  EXPECT_EQ(budget->used(), 2 * kHeld);
-  Backlog greedy = backlogWith(queue), other = backlogWith(queue), all = backlogWith(lossless);
-  for (std::uint64_t i = 0; i < 10; ++i) greedy.push(frameNumber(i));
-  EXPECT_EQ(budget->used(), 4 * kHeld);
-  EXPECT_EQ(greedy.heldBytes(), 3 * kHeld) << "its reserved one and the two that were left";
-  const auto refused = Backlog::reserve(queue, 64);
-  ASSERT_FALSE(refused.ok());
-  EXPECT_EQ(refused.error().code, Error::Code::Busy);
-  EXPECT_NE(refused.error().message.find("limits.backlog_mb"), std::string::npos);
-  EXPECT_FALSE(greedy.another(64).has_value());
-  // Whoever takes what comes is served all the same.
-  for (std::uint64_t i = 0; i < 3; ++i) {
-    other.push(frameNumber(i));
-    EXPECT_EQ(delivered(other).dropped_before, 0u);
-    all.push(frameNumber(i));
-    EXPECT_EQ(delivered(all).frame->frame.sequence, i);
+struct Payers {
+  std::shared_ptr<Budget> budget;
+  explicit Payers(std::uint64_t limit, std::size_t shares = 2) : budget(std::make_shared<Budget>(limit, shares)) {}
+  [[nodiscard]] std::shared_ptr<Account> account(std::uint64_t limit = 1ull << 40) const {
+    return std::make_shared<Account>(budget, limit);
   }
-  all.push(frameNumber(3));
-  all.push(frameNumber(4));
-  EXPECT_EQ(delivered(all).frame->frame.sequence, 3u);
-  const Error end = std::get<Error>(all.take().value());
+};
+
+Backlog::Settings paidBy(std::shared_ptr<Account> account, Policy policy, bool keeps = false) {
+  return {.policy = policy, .depth = 100, .account = std::move(account), .keeps_at_overrun = keeps};
+}
+
+TEST(Backlog, OneClientLeavesTheShareOfAnother) {
+  const Payers all{8 * kHeld};
+  const auto greedy = all.account(), other = all.account();
+  auto reserved = Backlog::reserve(paidBy(greedy, Policy::Queue), 64);
+  ASSERT_TRUE(reserved.ok());
+  EXPECT_EQ(all.budget->used(), 2 * kHeld);
+  Backlog queue = backlogWith(paidBy(greedy, Policy::Queue));
+  for (std::uint64_t i = 0; i < 20; ++i) queue.push(frameNumber(i));
+  EXPECT_EQ(greedy->used(), 5 * kHeld) << "two for its share, and three of the other four: as many as are free, four times";
+  EXPECT_EQ(queue.heldBytes(), 4 * kHeld) << "its reserved one and three more";
+  EXPECT_FALSE(Backlog::reserve(paidBy(greedy, Policy::Queue), 64).ok());
+  EXPECT_TRUE(Backlog::reserve(paidBy(other, Policy::Queue), 64).ok());
+  EXPECT_EQ(delivered(queue).dropped_before, 16u);
+  while (queue.take()) continue;
+  EXPECT_EQ(all.budget->used(), 2 * kHeld);
+  *reserved = Share{};
+  EXPECT_EQ(all.budget->used(), 0u);
+}
+
+TEST(Backlog, ARefusedReservationNamesTheLimitInTheWay) {
+  const Payers all{10 * kHeld};
+  const auto refusal = [&](std::uint64_t limit) {
+    return Backlog::reserve(paidBy(all.account(limit), Policy::Queue), 5 * kHeld).error();
+  };
+  EXPECT_EQ(refusal(1ull << 40).code, Error::Code::Busy);
+  EXPECT_NE(refusal(1ull << 40).message.find("limits.backlog_mb"), std::string::npos);
+  EXPECT_NE(refusal(kHeld).message.find("limits.session_backlog_mb"), std::string::npos);
+}
+
+TEST(Backlog, AFrameThatWaitsForSeveralSubscriptionsOfAClientCountsOnce) {
+  const Payers all{100 * kHeld};
+  const auto mine = all.account(), other = all.account();
+  Backlog one = backlogWith(paidBy(mine, Policy::Queue)), two = backlogWith(paidBy(mine, Policy::Lossless));
+  Backlog others = backlogWith(paidBy(other, Policy::Queue));
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    const auto frame = frameNumber(i);
+    for (Backlog* backlog : {&one, &two, &others}) backlog->push(frame);
+  }
+  EXPECT_EQ(mine->used(), 3 * kHeld) << "all but the oldest";
+  EXPECT_EQ(other->used(), 3 * kHeld);
+  EXPECT_EQ(all.budget->used(), 3 * kHeld);
+  while (one.take()) continue;
+  EXPECT_EQ(mine->used(), 3 * kHeld) << "the other subscription has them still";
+  while (two.take()) continue;
+  EXPECT_EQ(mine->used(), 0u);
+  EXPECT_EQ(all.budget->used(), 3 * kHeld);
+}
+
+TEST(Backlog, PlanesThatFramesOfTwoSelectionsHaveInCommonCountOnce) {
+  const Payers all{1ull << 30};
+  const auto account = all.account();
+  const Plane shared = toPlane(PlaneKind::Range, Image<float>{64, 64});
+  const auto framed = [&] {
+    auto frame = std::make_shared<PreparedFrame>();
+    frame->frame.planes = {shared};
+    frame->body = wire::layOutBody(frame->frame.planes);
+    return frame;
+  };
+  const PreparedFramePtr whole = framed(), again = framed();
+  const auto first = Hold::of(account, whole);
+  const std::uint64_t alone = account->used();
+  EXPECT_EQ(alone, whole->heldBytes());
+  const auto second = Hold::of(account, again);
+  EXPECT_EQ(account->used(), alone + again->heldBytes() - 64 * 64 * sizeof(float));
+}
+
+TEST(Backlog, ALosslessSubscriptionThatOverranGivesItsMemoryBackAndSaysSoAtOnce) {
+  const Payers all{8 * kHeld};
+  const auto account = all.account();
+  int woken = 0;
+  Backlog backlog{paidBy(account, Policy::Lossless), [&] { ++woken; }};
+  for (std::uint64_t i = 0; i < 20; ++i) backlog.push(frameNumber(i));
+  EXPECT_EQ(account->used(), 0u);
+  EXPECT_EQ(backlog.heldBytes(), 0u);
+  EXPECT_EQ(woken, 2) << "for the first frame, and for the end";
+  const Error end = std::get<Error>(backlog.take().value());
   EXPECT_EQ(end.code, Error::Code::Overrun);
   EXPECT_NE(end.message.find("limits.backlog_mb"), std::string::npos) << end.message;
-  EXPECT_EQ(delivered(greedy).dropped_before, 7u);
-  EXPECT_EQ(budget->used(), 3 * kHeld);
-  while (greedy.take()) continue;
-  EXPECT_EQ(budget->used(), 2 * kHeld);
-  *reserved = Share{};
-  EXPECT_EQ(budget->used(), 0u);
+}
+
+TEST(Backlog, ARecorderThatOverranStillGetsWhatWaited) {
+  const Payers all{8 * kHeld};
+  Backlog backlog = backlogWith(paidBy(all.account(), Policy::Lossless, true));
+  for (std::uint64_t i = 0; i < 20; ++i) backlog.push(frameNumber(i));
+  for (std::uint64_t i = 0; i < 6; ++i) EXPECT_EQ(delivered(backlog).frame->frame.sequence, i);
+  EXPECT_EQ(std::get<Error>(backlog.take().value()).code, Error::Code::Overrun);
+}
+
+TEST(Account, WhateverManyTakeTheNextHasItsShare) {
+  constexpr std::uint64_t kLimit = 1'000'000, kShares = 64;
+  const Payers all{kLimit, kShares};
+  std::vector<std::shared_ptr<Account>> greedy;
+  for (std::uint64_t i = 0; i + 1 < kShares; ++i) {
+    greedy.push_back(all.account());
+    for (const auto& one : greedy) {
+      while (one->take(100)) continue;
+    }
+  }
+  const auto next = all.account();
+  EXPECT_TRUE(next->take(kLimit / (2 * kShares)));
+  EXPECT_LE(all.budget->used(), kLimit);
+  EXPECT_GT(greedy.front()->used(), 10 * next->used()) << "who was first has much of the common half";
 }
 
 TEST(Backlog, NeverHoldsMoreThanOneFrameUnderLockstep) {

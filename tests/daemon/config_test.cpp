@@ -167,7 +167,13 @@ TEST(Config, SourcesNeedNamesOfTheirOwn) {
 TEST(Config, AnAddressOthersReachNeedsTheWordForIt) {
   EXPECT_SAYS(errorOf("[listen]\naddress = '0.0.0.0'"), "allow_remote = true");
   EXPECT_SAYS(errorOf("[listen]\naddress = '::'"), "allow_remote = true");
-  EXPECT_EQ(errorOf("[listen]\naddress = '0.0.0.0'\nallow_remote = true"), "no error");
+  EXPECT_EQ(errorOf("[listen]\naddress = '0.0.0.0'\nallow_remote = true\ninsecure = true"), "no error");
+  EXPECT_SAYS(errorOf("[listen]\naddress = '0.0.0.0'\nallow_remote = true"), "no certificate and no roles");
+  EXPECT_SAYS(errorOf("[listen]\naddress = '0.0.0.0'\nallow_remote = true\n[roles]\nview = ['anyone']"),
+              "is no certificate, so that anybody listens");
+  EXPECT_SAYS(errorOf("[listen]\ncertificate = 'c.pem'"), "certificate and key belong together");
+  EXPECT_SAYS(errorOf("[listen]\ncertificate = 'c.pem'\nkey = 'k.pem'"), "c.pem: cannot be used as a certificate");
+  EXPECT_SAYS(errorOf("[roles]\nview = ['everybody']"), "has \"everybody\", but must have user:NAME");
   EXPECT_EQ(errorOf("[listen]\naddress = '::1'"), "no error");
   EXPECT_SAYS(errorOf("[listen]\nport = 1\naddress = '0.0.0.0'"), "toftwind.toml:3: address = ");
 }

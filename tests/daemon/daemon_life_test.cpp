@@ -49,7 +49,7 @@ TEST_F(RunningDaemon, AFacadeThatThisBuildLacksIsToldInTheLog) {
   boost::asio::io_context io;
   Hub hub{Hub::Options{}, clock_};
   Facades facades{io, hub, clock_};
-  facades.apply({{.keys = {.kind = "telegraph", .source = "cam", .intervals = {}},
+  facades.apply({{.keys = {.kind = "telegraph", .source = "cam", .allow = {}, .intervals = {}},
                   .unevenness = {},
                   .fingerprint = "",
                   .start = {},
@@ -269,7 +269,7 @@ TEST_F(RunningDaemon, ASocketInAFolderThatIsNotThereIsNamed) {
 }
 
 TEST_F(RunningDaemon, AnAddressThatThisMachineLacksIsRefused) {
-  configure("[listen]\naddress = '192.0.2.1'\nallow_remote = true\n");  // RFC 5737: nobody's
+  configure("[listen]\naddress = '192.0.2.1'\nallow_remote = true\ninsecure = true\n");  // RFC 5737: nobody's
   const auto refused = Daemon::start(options());
   ASSERT_FALSE(refused.ok());
   EXPECT_THAT(refused.error().message, HasSubstr("does not have that address"));

@@ -24,6 +24,7 @@
 #include <toftwin/client.h>
 
 #include "protocol/record/recording.h"
+#include "toftwind_process.h"
 
 namespace toftwin {
 namespace {
@@ -32,86 +33,10 @@ using namespace std::chrono_literals;
 using testing::HasSubstr;
 using Policy = SubscribeOptions::Policy;
 
-constexpr auto kSoon = 60s;  // for a loaded machine; only a broken daemon needs it
-
-/// A child process whose standard output and error go into a file.
-class Process {
- public:
-  Process(
-      std::vector<std::string> arguments, std::filesystem::path log,
-      const std::function<void()>& in_child = [] {})
-      : log_(std::move(log)) {
-    arguments.insert(arguments.begin(), TOFTWIND);
-    std::vector<char*> words;
-    for (std::string& argument : arguments) words.push_back(argument.data());
-    words.push_back(nullptr);
-    pid_ = ::fork();
-    if (pid_ != 0) return;
-    const int fd = ::open(log_.c_str(), O_WRONLY | O_CREAT | O_APPEND, 0600);
-    ::dup2(fd, 1);
-    ::dup2(fd, 2);
-    in_child();
-    ::execv(TOFTWIND, words.data());
-    ::_exit(127);
-  }
-  ~Process() {
-    if (pid_ <= 0) return;
-    ::kill(pid_, SIGKILL);
-    ::waitpid(pid_, nullptr, 0);
-  }
-  Process(const Process&) = delete;
-  Process& operator=(const Process&) = delete;
-
-  void signal(int number) const { ::kill(pid_, number); }
-  [[nodiscard]] pid_t pid() const { return pid_; }
-  /// The exit code, or minus the signal that killed it.
-  int wait() {
-    int status = 0;
-    ::waitpid(pid_, &status, 0);
-    pid_ = -1;
-    return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
-  }
-  [[nodiscard]] std::string said() const {
-    std::ostringstream text;
-    text << std::ifstream{log_}.rdbuf();
-    return text.str();
-  }
-  [[nodiscard]] bool says(const std::string& part) const {
-    const auto deadline = std::chrono::steady_clock::now() + kSoon;
-    while (said().find(part) == std::string::npos) {
-      if (std::chrono::steady_clock::now() > deadline) return false;
-      std::this_thread::sleep_for(2ms);  // polls a file; nothing depends on how long it takes
-    }
-    return true;
-  }
-
- private:
-  std::filesystem::path log_;
-  pid_t pid_ = -1;
-};
-
-class Toftwind : public testing::Test {
- protected:
-  void SetUp() override {
-    std::string name = testing::TempDir() + "toftwindXXXXXX";
-    ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder_ = name;
-  }
-  void TearDown() override { std::filesystem::remove_all(folder_); }
-
-  void configure(const std::string& toml) const { std::ofstream{folder_ / "d.toml"} << toml; }
-  [[nodiscard]] std::string path(const char* name) const { return (folder_ / name).string(); }
-  [[nodiscard]] std::vector<std::string> arguments() const {
-    return {"--config", path("d.toml"), "--port", "0", "--socket", path("s")};
-  }
-  [[nodiscard]] Result<Client> client() const { return Client::connect("unix:" + path("s")); }
-
-  std::filesystem::path folder_;
-};
-
-const std::string kPattern =
-    "recording_folder = '.'\n[[source]]\nname = 'cam'\ndriver = 'pattern'\n"
-    "width = 64\nheight = 48\n";
+using test::kPattern;
+using test::kSoon;
+using test::Process;
+using test::Toftwind;
 
 TEST_F(Toftwind, StopsCleanlyOnSigterm) {
   configure(kPattern);
@@ -310,6 +235,64 @@ TEST_F(Toftwind, ReplaysAtTheRecordedTimes) {
     ASSERT_TRUE(frame.ok()) << frame.error().message;
     EXPECT_GE(std::chrono::steady_clock::now() - subscribed, after);
   }
+}
+
+/// The files of a recording that goes on and on, each opened.
+std::vector<record::Reader> filesIn(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> names;
+  for (const auto& entry : std::filesystem::directory_iterator{folder}) {
+    if (entry.path().extension() == ".mcap") names.push_back(entry.path());
+  }
+  std::vector<record::Reader> readers;
+  for (const auto& name : names) {
+    auto reader = record::Reader::open(name);
+    if (reader) readers.push_back(*std::move(reader));
+  }
+  // The newest may have been begun a moment before the kill, and have nothing yet.
+  EXPECT_GE(readers.size() + 1, names.size());
+  return readers;
+}
+
+TEST_F(Toftwind, ARecordingThatGoesOnAndOnIsSplitWithoutAGapAndOutlivesAKill) {
+  configure(kPattern + "record = { file = 'cam-%H%M%S', split = '1s', keep = '100MB' }\n");
+  const auto waitForFiles = [&](std::size_t count) {
+    const auto deadline = std::chrono::steady_clock::now() + kSoon;
+    const auto closed = [&] {
+      std::size_t found = 0;
+      for (const auto& entry : std::filesystem::directory_iterator{folder_}) found += entry.path().extension() == ".mcap";
+      return found;
+    };
+    while (closed() < count && std::chrono::steady_clock::now() < deadline) std::this_thread::sleep_for(10ms);
+    return closed() >= count;
+  };
+  {
+    Process daemon{arguments(), path("log")};
+    ASSERT_TRUE(daemon.says("cam: recording into ")) << daemon.said();
+    EXPECT_TRUE(daemon.says("then the oldest files make room")) << daemon.said();
+    ASSERT_TRUE(waitForFiles(4));
+    const auto refused = client()->startRecording("cam", "another");
+    EXPECT_EQ(refused.error().code, Error::Code::Busy);
+    EXPECT_EQ(client()->health()->sources.at(0).recording_by, "the configuration");
+    daemon.signal(SIGKILL);
+    daemon.wait();
+  }
+  std::vector<std::uint64_t> sequences;
+  std::size_t with_index = 0;
+  auto files = filesIn(folder_);
+  for (record::Reader& file : files) {
+    with_index += file.summary().indexed ? 1 : 0;
+    std::size_t frames = 0;
+    for (auto frame = file.next("cam"); frame.ok(); frame = file.next("cam"), ++frames) {
+      sequences.push_back(frame->sequence);
+    }
+    EXPECT_TRUE(frames > 0 || !file.summary().indexed) << "closed without a frame";
+  }
+  std::ranges::sort(sequences);  // files of one moment have no order
+  for (std::size_t i = 1; i < sequences.size(); ++i) EXPECT_EQ(sequences[i], sequences[i - 1] + 1);
+  EXPECT_GT(sequences.size(), 60u);
+  EXPECT_GE(with_index + 1, files.size()) << "all but the one that was being written";
+  Process again{arguments(), path("log2")};
+  ASSERT_TRUE(waitForFiles(files.size() + 1)) << again.said();
 }
 
 TEST_F(Toftwind, AFullDiskEndsTheRecordingKeepsWhatWasWrittenAndSaysSo) {

@@ -165,13 +165,13 @@ TEST(Session, WhatIsOnItsWayCountsAgainstTheDaemonsBudget) {
   while (talk.session->next()) ++sent;
   EXPECT_GE(sent, 1);
   EXPECT_LT(sent, 6);
-  EXPECT_LE(talk.hub.budget()->used(), talk.hub.budget()->limit());
+  EXPECT_LE(talk.hub.budget().used(), talk.hub.budget().limit());
   request.source = "cam";
   const Error full = errorIn(talk.ask(request));
   EXPECT_EQ(full.code, Error::Code::Busy);
   EXPECT_NE(full.message.find("limits.backlog_mb"), std::string::npos) << full.message;
   talk.ask(wire::Unsubscribe{9, id});
-  EXPECT_TRUE(eventuallyUnused(*talk.hub.budget()));
+  EXPECT_TRUE(eventuallyUnused(talk.hub.budget()));
 }
 
 TEST(Session, SendsFramesOfItsSubscriptions) {
@@ -353,6 +353,42 @@ TEST(Session, TheIdOfARequestIsFreeWhenItIsAnswered) {
   EXPECT_TRUE(talk.session->handle(wire::SetPose{12, "cam", {}}).empty());
   EXPECT_EQ(errorIn(talk.ask(wire::ListSources{12})).message, "the id 12 is that of a request that is not answered yet");
   EXPECT_TRUE(talk.session->isOver());
+}
+
+TEST(Session, ARecordingIsStoppedByWhoeverBeganItOrAnAdministrator) {
+  const std::filesystem::path folder = testing::TempDir() + "toftwin_owned_recording";
+  std::filesystem::remove_all(folder);
+  const auto of = [](const char* name, bool is_admin) {
+    return Session::Options{.features = {},
+                            .who = {.name = name, .text = name},
+                            .identify = [=](const wire::Hello&) -> Result<Identity> {
+                              return Identity{name, {.view = true, .control = true, .record = true, .admin = is_admin}};
+                            }};
+  };
+  Conversation owner{of("user 1", false), {.recording_folder = folder, .recording = {}}};
+  owner.hello();
+  const auto stopBy = [&](Session::Options options) {
+    Session session{owner.hub, std::move(options), [&] { owner.woken.add(); }};
+    session.handle(wire::Hello{1, "test", {}});
+    session.handle(wire::Record{2, "cam", ""});
+    for (int seen = owner.woken.count();; seen = owner.woken.count()) {
+      if (auto answer = session.next()) return std::get<Message>(*std::move(answer));
+      if (!owner.woken.reaches(seen + 1)) return Message{};
+    }
+  };
+  const auto begin = [&](const char* file) {
+    owner.session->handle(wire::Record{3, "cam", file});
+    return std::holds_alternative<wire::Done>(std::get<Message>(owner.later()));
+  };
+  ASSERT_TRUE(begin("a"));
+  EXPECT_EQ(owner.hub.health().sources.at(0).recording_by, "user 1");
+  const Error refused = errorIn(stopBy(of("user 2", false)));
+  EXPECT_EQ(refused.code, Error::Code::PermissionDenied);
+  EXPECT_NE(refused.message.find("belongs to user 1"), std::string::npos) << refused.message;
+  EXPECT_TRUE(std::holds_alternative<wire::Done>(stopBy(of("user 1", false)))) << "another client of the same user";
+  ASSERT_TRUE(begin("b"));
+  EXPECT_TRUE(std::holds_alternative<wire::Done>(stopBy(of("user 3", true))));
+  std::filesystem::remove_all(folder);
 }
 
 TEST(Session, RecordingWithoutAFolderIsRefusedWithTheKeyToSet) {

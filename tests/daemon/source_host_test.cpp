@@ -34,9 +34,10 @@ struct Rig {
     };
     host = std::make_unique<SourceHost>("cam", open, open(), options, clock);
   }
-  SubscriberPtr subscribe(Taker& taker,
-                          Backlog::Settings backlog = {.policy = Policy::Queue, .depth = 100}) {
-    auto subscribed = host->subscribe({{}, backlog}, taker.wake());
+  SubscriberPtr subscribe(Taker& taker, Backlog::Settings backlog = {.policy = Policy::Queue, .depth = 100},
+                          const std::string& who = {}) {
+    const Subscribing subscribing{.name = who, .text = who, .lockstep_patience = std::chrono::seconds{5}};
+    auto subscribed = host->subscribe({{}, backlog, subscribing}, taker.wake());
     EXPECT_TRUE(subscribed.ok()) << subscribed.error().message;
     return *subscribed;
   }
@@ -150,6 +151,77 @@ TEST(SourceHost, ALockstepSubscriberThatVanishesHoldsNobodyUp) {
   rig.host->acknowledge(first, 0);
   rig.host->unsubscribe(second);
   EXPECT_EQ(one.nextSequence(first->backlog), 1);
+}
+
+/// The source looks at the clock when it is woken; each wake may come a moment too early for what it waits for.
+bool comesByItself(Rig& rig, Taker& taker, Backlog& backlog, std::int64_t sequence) {
+  for (int i = 0; i < 3; ++i) (void)rig.command([](auto&) { return Result<>{}; });
+  return taker.nextSequence(backlog) == sequence;
+}
+
+TEST(SourceHost, GoesOnWithoutALockstepSubscriberThatKeepsOthersWaitingTooLong) {
+  Rig rig;
+  rig.start();
+  Taker holding, watching;
+  const auto holder = rig.subscribe(holding, {.policy = Policy::Lockstep}, "holder");
+  const auto watcher = rig.subscribe(watching);
+  rig.remote->give(4);
+  ASSERT_EQ(holding.nextSequence(holder->backlog), 0);
+  ASSERT_EQ(watching.nextSequence(watcher->backlog), 0);
+  rig.clock.advance(std::chrono::seconds{4});
+  EXPECT_EQ(rig.host->health().lockstep_by, "holder, waited for since 4.0 s");
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(rig.command([](auto&) { return Result<>{}; }).ok());
+  EXPECT_FALSE(watcher->backlog.take().has_value()) << "too early";
+  rig.clock.advance(std::chrono::seconds{2});
+  EXPECT_TRUE(comesByItself(rig, watching, watcher->backlog, 1));
+  EXPECT_EQ(watching.nextSequence(watcher->backlog), 2);
+  EXPECT_EQ(rig.host->health().lockstep_by, "holder, which others do not wait for any more");
+  EXPECT_EQ(watching.nextSequence(watcher->backlog), 3);
+  EXPECT_FALSE(holder->backlog.take().has_value());
+  rig.host->acknowledge(holder, 0);
+  rig.remote->give();  // the frame that is waited for was begun before that: it may lack what the holder set
+  EXPECT_EQ(watching.nextSequence(watcher->backlog), 4);
+  rig.remote->give(2);
+  const auto next = std::get<Backlog::Delivery>(*holding.next(holder->backlog));
+  EXPECT_EQ(next.frame->frame.sequence, 5u);
+  EXPECT_EQ(next.dropped_before, 4u);
+  EXPECT_EQ(watching.nextSequence(watcher->backlog), 5);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(rig.command([](auto&) { return Result<>{}; }).ok());
+  EXPECT_FALSE(watcher->backlog.take().has_value()) << "it is waited for again";
+}
+
+TEST(SourceHost, ALockstepSubscriberThatKeepsNobodyWaitingHasAllTheTime) {
+  Rig rig;
+  rig.start();
+  Taker taker;
+  const auto holder = rig.subscribe(taker, {.policy = Policy::Lockstep}, "holder");
+  rig.remote->give(2);
+  ASSERT_EQ(taker.nextSequence(holder->backlog), 0);
+  rig.clock.advance(std::chrono::hours{1});
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(rig.command([](auto&) { return Result<>{}; }).ok());
+  EXPECT_FALSE(holder->backlog.take().has_value());
+  rig.host->acknowledge(holder, 0);
+  EXPECT_EQ(taker.nextSequence(holder->backlog), 1);
+}
+
+TEST(SourceHost, UnderLockstepFramesComeNoFasterThanItsOwnWhereSomebodyElseWatches) {
+  Rig rig;
+  rig.remote->info.frame_interval = 100_ms;
+  rig.start();
+  Taker holding, watching;
+  const auto holder = rig.subscribe(holding, {.policy = Policy::Lockstep}, "holder");
+  const auto watcher = rig.subscribe(watching, {.policy = Policy::Queue, .depth = 100}, "somebody else");
+  rig.remote->give(2);
+  ASSERT_EQ(holding.nextSequence(holder->backlog), 0);
+  rig.host->acknowledge(holder, 0);
+  for (int i = 0; i < 3; ++i) ASSERT_TRUE(rig.command([](auto&) { return Result<>{}; }).ok());
+  EXPECT_FALSE(holder->backlog.take().has_value()) << "too early";
+  rig.clock.advance(std::chrono::milliseconds{100});
+  EXPECT_TRUE(comesByItself(rig, holding, holder->backlog, 1));
+  rig.host->unsubscribe(watcher);
+  rig.remote->give();
+  rig.host->acknowledge(holder, 1);
+  EXPECT_EQ(holding.nextSequence(holder->backlog), 2) << "alone it is as fast as it likes";
 }
 
 TEST(SourceHost, APoseUnderLockstepIsThatOfTheNextFrame) {

@@ -117,7 +117,7 @@ Health fullHealth() {
   return {.id = 12,
           .uptime = 3600.25_s,
           .sessions = 3,
-          .sources = {{"kinect", true, 108'000, 2, 8, 1, ""},
+          .sources = {{"kinect", true, 108'000, 2, 8, 1, "", "user 1000 (client 5)", "user 1000 (client 4)"},
                       {"o3d", false, 0, 0, 0, 7, "no device at 192.168.0.69"}},
           .facades = {{"o3d303", "kinect", "XML-RPC on 127.0.0.1 port 80", FacadeState::Running, 2, ""},
                       {"modbus", "kinect", "", FacadeState::NotThere, {}, "port 502 is in use"}}};
@@ -151,6 +151,8 @@ std::vector<ExampleMessage> exampleMessages() {
   return {
       {"hello", Hello{1, "toftwind 0.1.0", {"memfd"}}},
       {"hello-bare", Hello{}},
+      {"hello-token", Hello{.id = 1, .software = "toftwin client", .features = {}, .token = "s3cret"}},
+      {"hello-idle", Hello{.id = 1, .software = "toftwind", .features = {}, .idle = 60_s}},
       {"list-sources", ListSources{2}},
       {"source-list", SourceList{2,
                                  {summary(),
@@ -178,6 +180,7 @@ std::vector<ExampleMessage> exampleMessages() {
       {"done", Done{11, "/var/lib/toftwin/monday.mcap"}},
       {"ask-health", AskHealth{12}},
       {"health", fullHealth()},
+      {"keep-alive", KeepAlive{}},
       {"failure", Failure{13, {Error::Code::NotFound, "no source is named \"kinekt\""}}},
   };
 }

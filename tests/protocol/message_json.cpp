@@ -103,6 +103,7 @@ class Renderer {
   static const char* nameOfMessage(const Record&) { return "Record"; }
   static const char* nameOfMessage(const Done&) { return "Done"; }
   static const char* nameOfMessage(const AskHealth&) { return "AskHealth"; }
+  static const char* nameOfMessage(const KeepAlive&) { return "KeepAlive"; }
   static const char* nameOfMessage(const Health&) { return "Health"; }
   static const char* nameOfMessage(const Failure&) { return "Failure"; }
 
@@ -237,6 +238,8 @@ class Renderer {
     field("subscribers", m.subscribers);
     field("reconnects", m.reconnects);
     field("last_error", m.last_error);
+    field("lockstep_by", m.lockstep_by);
+    field("recording_by", m.recording_by);
   }
   void fields(const FacadeHealth& m) {
     field("kind", m.kind);
@@ -251,6 +254,8 @@ class Renderer {
   void fields(const Hello& m) {
     field("software", m.software);
     field("features", m.features);
+    field("token", m.token);
+    if (m.idle) field("idle_s", m.idle->in(second));
   }
   void fields(const ListSources&) {}
   void fields(const SourceList& m) { field("sources", m.sources); }
@@ -323,6 +328,7 @@ class Renderer {
     field("facades", m.facades);
   }
   void fields(const Failure& m) { field("error", m.error); }
+  void fields(const KeepAlive&) {}
 
   Json json_;
 };

@@ -68,6 +68,7 @@ Command triggerCommand();
 Command usbCommand();
 Command doctorCommand();
 Command complianceCommand();
+Command certificateCommand();
 Command completionCommand();
 
 /// Fills `app` with all subcommands; the result has one Run for each row of `commands()`.

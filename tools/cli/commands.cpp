@@ -11,7 +11,7 @@ std::span<const Command> commands() {
       poseCommand(),      rigCommand(),        setCommand(),        triggerCommand(), renderCommand(),
       calibrateCommand(), planCommand(),       measureCommand(),    compareCommand(), discoverCommand(),
       suitCommand(),      logCommand(),        trendCommand(),      locateCommand(),  usbCommand(),
-      doctorCommand(),    complianceCommand(), completionCommand(),
+      doctorCommand(),    complianceCommand(), certificateCommand(), completionCommand(),
   };
   return kCommands;
 }

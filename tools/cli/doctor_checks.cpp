@@ -156,7 +156,7 @@ Finding checkFolder(const std::filesystem::path& folder) {
 }
 
 std::vector<Finding> checkDaemon(const DaemonOptions& daemon) {
-  auto client = Client::connect(daemon.address, {.timeout = daemon.timeout()});
+  auto client = Client::connect(daemon.address, daemon.clientOptions());
   if (!client) {
     return {{State::Bad, "daemon", client.error().message,
              daemon.address.empty()
@@ -187,9 +187,11 @@ std::vector<Finding> checkDaemon(const DaemonOptions& daemon) {
          : is_bad ? State::Bad
                   : State::Warning,
          source.name,
-         fmt::format("{}, {} frames, {} lost by the device, {} reconnects{}{}",
+         fmt::format("{}, {} frames, {} lost by the device, {} reconnects{}{}{}{}{}{}",
                      source.streaming ? "streaming" : "idle", source.frames, source.dropped_by_device,
-                     source.reconnects, is_well ? "" : ": ", source.last_error),
+                     source.reconnects, source.lockstep_by.empty() ? "" : ", in lockstep with ", source.lockstep_by,
+                     source.recording_by.empty() ? "" : ", recorded for ", source.recording_by,
+                     is_well ? "" : ": ", source.last_error),
          mendSource(source)});
   }
   return findings;

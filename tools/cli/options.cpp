@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 
 #include <toftwin/names.h>
 
@@ -29,7 +30,7 @@ std::string isAddress(const std::string& text) {
 
 void DaemonOptions::add(Arguments& args) {
   args.option("-a,--address", address,
-              "where the daemon is: HOST:PORT or unix:/PATH; default: its socket on this machine, "
+              "where the daemon is: HOST:PORT, tls:HOST:PORT or unix:/PATH; default: its socket on this machine, "
               "then port 47800 of it")
       .valid(isAddress)
       .environment("TOFTWIN_ADDRESS");
@@ -38,8 +39,21 @@ void DaemonOptions::add(Arguments& args) {
       .showsDefault();
 }
 
+ClientOptions DaemonOptions::clientOptions() const {
+  const auto variable = [](const char* name) {
+    const char* value = std::getenv(name);  // NOLINT(concurrency-mt-unsafe): nobody sets it
+    return std::string{value == nullptr ? "" : value};
+  };
+  ClientOptions options{.timeout = timeout()};
+  options.token = variable("TOFTWIN_TOKEN");
+  options.authorities = variable("TOFTWIN_AUTHORITIES");
+  options.certificate = variable("TOFTWIN_CERTIFICATE");
+  options.key = variable("TOFTWIN_KEY");
+  return options;
+}
+
 Result<Client> DaemonOptions::connect() const {
-  auto client = Client::connect(address, {.timeout = timeout()});
+  auto client = Client::connect(address, clientOptions());
   if (client) return client;
   return Error{
       Error::Code::Disconnected,

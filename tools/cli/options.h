@@ -23,6 +23,9 @@ struct DaemonOptions {
   /// The connection, or an Error Disconnected (whatever the reason) that says how to start a
   /// daemon.
   [[nodiscard]] Result<Client> connect() const;
+  /// With what the environment says of this client: TOFTWIN_TOKEN, and for "tls:" TOFTWIN_AUTHORITIES, TOFTWIN_CERTIFICATE
+  /// and TOFTWIN_KEY.
+  [[nodiscard]] ClientOptions clientOptions() const;
   [[nodiscard]] std::chrono::milliseconds timeout() const {
     return std::chrono::milliseconds{static_cast<std::int64_t>(timeout_s * 1000.0)};
   }

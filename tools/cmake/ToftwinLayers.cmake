@@ -97,7 +97,7 @@ function(_toftwin_check_includes name folder reachable)
 endfunction()
 
 # toftwin_program(<name> FOLDER <folder> SOURCES … LINKS … [LIBRARIES …]): an executable above all
-# layers, installed, with the same include check.
+# layers, installed as a component of its own name, with the same include check.
 function(toftwin_program name)
   cmake_parse_arguments(arg "" "FOLDER" "SOURCES;LINKS;LIBRARIES" ${ARGN})
   set(reachable ${arg_FOLDER})
@@ -112,5 +112,5 @@ function(toftwin_program name)
   add_executable(${name} ${arg_SOURCES})
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
   target_link_libraries(${name} PRIVATE ${arg_LINKS} ${arg_LIBRARIES} toftwin_options)
-  install(TARGETS ${name})
+  install(TARGETS ${name} COMPONENT ${name})
 endfunction()

@@ -16,6 +16,7 @@
 #include "daemon/facades/gige_vision/source_facts.h"
 #include "daemon/facades/mac_address.h"
 #include "daemon/facades/source_link.h"
+#include "daemon/networks.h"
 #include "drivers/logging.h"
 #include "protocol/settings/describe.h"
 
@@ -53,9 +54,13 @@ class GigeVisionFacade final : public Facade {
   Result<> open() {
     auto place = localPlace(place_.keys.address);
     if (!place) return place.error();
+    auto allowed = Networks::read(place_.keys.allow);
+    if (!allowed) return allowed.error();
     auto control = ControlSockets::open(
         thread_.io(), *place,
-        [this](const Peer& from, std::span<const std::byte> datagram) { take(from, datagram); });
+        [this, allowed = *std::move(allowed)](const Peer& from, std::span<const std::byte> datagram) {
+          if (allowed.admit(boost::asio::ip::address_v4{from.address})) take(from, datagram);
+        });
     if (!control) return control.error();
     control_ = *std::move(control);
     auto stream = udpSocket(thread_.io(), place->address, 0);

@@ -4,6 +4,7 @@
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 
+#include <algorithm>
 #include <array>
 #include <chrono>
 
@@ -14,6 +15,7 @@ using boost::asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr std::size_t kMostConnections = 16;
+constexpr std::chrono::seconds kLongSilence{10};  ///< after which a connection's place can be another's
 
 }  // namespace
 
@@ -40,6 +42,7 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
     received_.erase(received_.begin(), received_.begin() + static_cast<std::ptrdiff_t>(*size));
     send(server_.hooks_.fate());
   }
+  [[nodiscard]] std::chrono::steady_clock::time_point heard() const { return heard_; }
   void close() {
     error_code ignored;
     socket_.close(ignored);
@@ -82,6 +85,7 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
     socket_.async_read_some(
         boost::asio::buffer(piece_), [self = shared_from_this()](error_code error, std::size_t size) {
           if (error || !*self->alive_) return self->close();
+          self->heard_ = std::chrono::steady_clock::now();
           const auto begin = self->piece_.begin();
           self->received_.insert(self->received_.end(), begin, begin + static_cast<std::ptrdiff_t>(size));
           self->goOn();
@@ -92,14 +96,15 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
   const std::shared_ptr<bool> alive_;
   tcp::socket socket_;
   boost::asio::steady_timer later_;
+  std::chrono::steady_clock::time_point heard_ = std::chrono::steady_clock::now();
   std::array<std::byte, 512> piece_{};
   Bytes received_;  ///< less than a message and a piece
   Bytes answer_;
 };
 
-Server::Server(tcp::acceptor acceptor, Hooks hooks)
+Server::Server(Listening listening, Hooks hooks)
     : hooks_(std::move(hooks)),
-      accepting_(std::move(acceptor), [this](tcp::socket socket) { take(std::move(socket)); }) {}
+      accepting_(std::move(listening), [this](tcp::socket socket) { take(std::move(socket)); }) {}
 
 Server::~Server() {
   *is_alive_ = false;
@@ -107,7 +112,11 @@ Server::~Server() {
 }
 
 void Server::take(tcp::socket socket) {
-  if (connections_.size() >= kMostConnections) return;
+  if (connections_.size() >= kMostConnections) {
+    const auto silent = *std::ranges::min_element(connections_, {}, [](const auto& one) { return one->heard(); });
+    if (std::chrono::steady_clock::now() - silent->heard() < kLongSilence) return;
+    silent->close();
+  }
   auto connection = std::make_shared<Connection>(*this, std::move(socket));
   connections_.insert(connection);
   hooks_.connections(connections_.size());

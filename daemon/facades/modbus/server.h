@@ -28,7 +28,7 @@ class Server {
     std::function<void(const LineFaults::Fate&, LineFaults::Kind)> note;  ///< it happened
     Duration delay = 100_ms;                       ///< of one that is delayed
   };
-  Server(boost::asio::ip::tcp::acceptor acceptor, Hooks hooks);
+  Server(Listening listening, Hooks hooks);
   ~Server();
   Server(const Server&) = delete;
   Server& operator=(const Server&) = delete;

@@ -103,10 +103,10 @@ class HttpServer::Connection : public std::enable_shared_from_this<Connection> {
   http::response<http::string_body> response_;
 };
 
-HttpServer::HttpServer(tcp::acceptor acceptor, std::vector<std::string> own_names, Ask ask)
+HttpServer::HttpServer(Listening listening, std::vector<std::string> own_names, Ask ask)
     : own_names_(std::move(own_names)),
       ask_(std::move(ask)),
-      accepting_(std::move(acceptor), [this](tcp::socket socket) { take(std::move(socket)); }) {}
+      accepting_(std::move(listening), [this](tcp::socket socket) { take(std::move(socket)); }) {}
 
 HttpServer::~HttpServer() {
   *is_alive_ = false;

@@ -24,7 +24,7 @@ class HttpServer {
   using Ask = std::function<void(std::string path, std::string body, Answer)>;
 
   /// `own_names`: see request_check.h.
-  HttpServer(boost::asio::ip::tcp::acceptor acceptor, std::vector<std::string> own_names, Ask ask);
+  HttpServer(Listening listening, std::vector<std::string> own_names, Ask ask);
   ~HttpServer();
   HttpServer(const HttpServer&) = delete;
   HttpServer& operator=(const HttpServer&) = delete;

@@ -75,7 +75,7 @@ class O3d303Facade final : public Facade {
     auto pcic =
         listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.pcic_port), "pcic_port");
     if (!pcic) return pcic.error();
-    const int xmlrpc_port = xmlrpc->local_endpoint().port(), pcic_port = pcic->local_endpoint().port();
+    const int xmlrpc_port = xmlrpc->acceptor.local_endpoint().port(), pcic_port = pcic->acceptor.local_endpoint().port();
     const auto mac = macOf(place_.keys.source);
     mac_ = textOf(mac);
     device_.emplace(Device::Identity{.name = keys_.name,

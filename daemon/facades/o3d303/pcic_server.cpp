@@ -22,9 +22,9 @@ std::string errorText(int code) { return fmt::format("{:09}", code); }
 
 }  // namespace
 
-PcicServer::PcicServer(tcp::acceptor acceptor, Hooks hooks)
+PcicServer::PcicServer(Listening listening, Hooks hooks)
     : hooks_(std::move(hooks)),
-      accepting_(std::move(acceptor), [this](tcp::socket socket) { take(std::move(socket)); }) {}
+      accepting_(std::move(listening), [this](tcp::socket socket) { take(std::move(socket)); }) {}
 
 PcicServer::~PcicServer() {
   *is_alive_ = false;

@@ -49,7 +49,7 @@ class PcicServer {
     /// The error that lasts, which a connection is told that did not hear it begin; 0: none does.
     std::function<int()> lasting_error = [] { return 0; };
   };
-  PcicServer(boost::asio::ip::tcp::acceptor acceptor, Hooks hooks);
+  PcicServer(Listening listening, Hooks hooks);
   ~PcicServer();
   PcicServer(const PcicServer&) = delete;
   PcicServer& operator=(const PcicServer&) = delete;

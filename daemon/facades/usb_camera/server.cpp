@@ -181,10 +181,10 @@ class Server::Connection : public std::enable_shared_from_this<Connection> {
   bool is_last_ = false;  ///< what is being written; then it is closed
 };
 
-Server::Server(tcp::acceptor acceptor, std::string name, std::chrono::milliseconds patience)
+Server::Server(Listening listening, std::string name, std::chrono::milliseconds patience)
     : name_(std::move(name)),
       patience_(patience),
-      accepting_(std::move(acceptor), [this](tcp::socket socket) { take(std::move(socket)); }) {}
+      accepting_(std::move(listening), [this](tcp::socket socket) { take(std::move(socket)); }) {}
 
 Server::~Server() {
   unplug();

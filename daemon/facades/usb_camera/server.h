@@ -21,7 +21,7 @@ class Server {
  public:
   /// `name` of the facade, for the log. A host that has vanished without a word is found out within
   /// `patience`, and the device is free again.
-  Server(boost::asio::ip::tcp::acceptor acceptor, std::string name,
+  Server(Listening listening, std::string name,
          std::chrono::milliseconds patience = std::chrono::seconds{25});
   ~Server();
   Server(const Server&) = delete;

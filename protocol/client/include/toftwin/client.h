@@ -59,6 +59,8 @@ struct SourceHealthEntry {
   std::uint32_t subscribers = 0;
   std::uint32_t reconnects = 0;
   std::string last_error;
+  std::string lockstep_by{};   ///< for people: who holds it in lockstep; empty: nobody, or not told
+  std::string recording_by{};  ///< for people: whose recording is being made; likewise
 };
 /// A language in which the daemon shows a source to programs that know nothing of toftwin.
 struct FacadeHealthEntry {
@@ -102,11 +104,16 @@ class Subscription {
 struct ClientOptions {
   std::chrono::milliseconds timeout{5000};
   std::uint64_t max_message_bytes = 256ull << 20;
+  std::string token{};  ///< says who this is, where the daemon has roles; in clear text but over "tls:" and on this machine
+  // Of "tls:", PEM files:
+  std::string authorities{};  ///< whose daemons are trusted; empty: the system's
+  std::string certificate{};  ///< of this client, where the daemon wants one; with its key
+  std::string key{};
 };
 
 class Client {
  public:
-  /// Address: "tcp:host:port", "unix:/path", or "host:port". Empty: the daemon's default Unix socket,
+  /// Address: "tcp:host:port", "unix:/path", "tls:host:port", or "host:port". Empty: the daemon's default Unix socket,
   /// then its default TCP port on loopback.
   static Result<Client> connect(std::string_view address = {}, ClientOptions options = {});
   Client(Client&&) noexcept;
