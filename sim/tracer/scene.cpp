@@ -319,7 +319,7 @@ struct SceneBuilder {
 };
 
 Result<Scene> Scene::load(const std::filesystem::path& file, Band band, const SceneLoading& how) {
-  return SceneBuilder::build(loadSceneFile(file), band, how);
+  return SceneBuilder::build(loadSceneFile(file, how), band, how);
 }
 
 Result<Scene> Scene::parse(std::string_view toml, const std::filesystem::path& name, Band band, const SceneLoading& how) {

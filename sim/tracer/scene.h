@@ -3,7 +3,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <stop_token>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -11,18 +10,14 @@
 #include <toftwin/result.h>
 #include <toftwin/units.h>
 
+#include "sim/tracer/scene_loading.h"
+
 namespace toftwin::sim {
 
 /// In which light a scene is seen: the cameras' own, or what a colour camera's filters let through.
 enum class Band { Infrared, Red, Green, Blue };
 
 struct ForeignEmitterSpec;
-
-/// How a scene is loaded.
-struct SceneLoading {
-  std::stop_token stop;      ///< ends it soon, with the error Stopped
-  bool may_convert = false;  ///< of mesh files: ReadOptions::may_convert
-};
 
 /// A built scene: meshes and primitives with their materials, ready to trace. Cheap to copy; copies
 /// share the geometry, which nobody changes.

@@ -9,6 +9,8 @@
 
 #include "protocol/settings/describe.h"
 #include "protocol/settings/settings.h"
+#include "sim/tracer/scene_tables.h"
+#include "sim/tracer/world_scene.h"
 
 namespace toftwin::sim {
 namespace {
@@ -113,19 +115,13 @@ void checkKeysFitModel(Table& table, Reflection model) {
 void readMaterials(Table& root, SceneFile& file) {
   SceneSpec& scene = file.spec;
   for (Table& table : root.tables("material")) {
-    MaterialSpec material;
-    table.read(material);
+    MaterialSpec material = readMaterial(table, file.textures.emplace_back());
     if (material.name.empty()) table.complain("name", "is missing: every material needs one");
     const bool is_known = std::any_of(scene.materials.begin(), scene.materials.end(),
                                       [&](const auto& m) { return m.name == material.name; });
     if (is_known) {
       table.complain("name", fmt::format("\"{}\" is taken by an earlier material", material.name));
     }
-    checkKeysFitModel(table, material.model);
-    NamedFile& texture = file.textures.emplace_back();
-    if (!material.texture.empty()) texture = {table.resolve(material.texture), table.place("texture")};
-    if (!material.color.empty() && material.color.size() != 3)
-      table.complain("color", "must be three numbers: red, green, blue");
     scene.materials.push_back(std::move(material));
   }
 }
@@ -266,8 +262,7 @@ Result<SceneFile> read(Table root) {
     checkAlone(table, file, places);
     file.spec.objects.push_back(file.objects.back().spec);
   }
-  readAmbient(root, file);
-  readForeignEmitters(root, file.spec);
+  readLight(root, file);
   if (file.objects.empty()) root.complain("", "the scene has no [[object]]");
   if (auto checked = root.check(); !checked) return checked.error();
   return file;
@@ -275,7 +270,23 @@ Result<SceneFile> read(Table root) {
 
 }  // namespace
 
-Result<SceneFile> loadSceneFile(const std::filesystem::path& file) {
+MaterialSpec readMaterial(Table& table, NamedFile& texture) {
+  MaterialSpec material;
+  table.read(material);
+  checkKeysFitModel(table, material.model);
+  if (!material.texture.empty()) texture = {table.resolve(material.texture), table.place("texture")};
+  if (!material.color.empty() && material.color.size() != 3)
+    table.complain("color", "must be three numbers: red, green, blue");
+  return material;
+}
+
+void readLight(Table& root, SceneFile& file) {
+  readAmbient(root, file);
+  readForeignEmitters(root, file.spec);
+}
+
+Result<SceneFile> loadSceneFile(const std::filesystem::path& file, const SceneLoading& how) {
+  if (isWorld(file)) return loadWorld(file, how);
   auto table = Table::load(file);
   if (!table) return table.error();
   return read(*std::move(table));

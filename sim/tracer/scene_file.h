@@ -16,6 +16,7 @@
 
 #include "sim/meshes/mesh_file.h"
 #include "sim/tracer/motion.h"
+#include "sim/tracer/scene_loading.h"
 
 namespace toftwin::sim {
 
@@ -290,6 +291,7 @@ struct PlacedObject {
   std::filesystem::path mesh;
   std::string place;       ///< "scene.toml:12"
   std::size_t number = 0;  ///< of the object in the file; the same for all that a mesh file's surfaces make of it
+  Vec3d stretch{1, 1, 1};  ///< of a mesh: factors along its file's axes
   std::shared_ptr<const TriangleMesh> triangles = nullptr;  ///< of a mesh once it is read; shared by copies
 };
 
@@ -306,9 +308,11 @@ struct SceneFile {
   std::vector<PlacedObject> objects;
   std::vector<NamedFile> textures;  ///< of the materials
   NamedFile map;                    ///< of the surroundings
+  std::vector<std::string> notes;   ///< what was left out, for people
 };
 
-Result<SceneFile> loadSceneFile(const std::filesystem::path& file);
+/// A scene file, or a world of another kind (world_scene.h).
+Result<SceneFile> loadSceneFile(const std::filesystem::path& file, const SceneLoading& how = {});
 Result<SceneFile> parseSceneFile(std::string_view toml, const std::filesystem::path& name);
 
 }  // namespace toftwin::sim

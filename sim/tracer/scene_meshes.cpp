@@ -48,38 +48,18 @@ double metresOf(LengthUnit unit) {
   return 1.0;
 }
 
-/// The triangles of one part, with the vertices that they use; places on a picture only if all have one.
-TriangleMesh partOf(const TriangleMesh& mesh, std::size_t first, std::size_t count) {
-  TriangleMesh part;
-  std::unordered_map<std::uint32_t, std::uint32_t> taken;
-  for (std::size_t i = first; i < first + count; ++i) {
-    auto& triangle = part.triangles.emplace_back();
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t vertex = mesh.triangles[i][k];
-      const auto [found, is_new] = taken.emplace(vertex, static_cast<std::uint32_t>(part.vertices.size()));
-      if (is_new) part.vertices.push_back(mesh.vertices[vertex]);
-      triangle[k] = found->second;
-    }
-    if (!mesh.places.empty()) part.places.push_back(mesh.places[i]);
-  }
-  const bool all_have_places = std::ranges::all_of(part.places, [](const auto& places) {
-    return std::ranges::all_of(places, [](TexturePlace at) { return std::isfinite(at.u) && std::isfinite(at.v); });
-  });
-  if (!all_have_places) part.places.clear();
-  return part;
-}
-
 /// Turns and scales a mesh as its object says, and notes a size that cannot be meant.
 void place(TriangleMesh& mesh, const PlacedObject& object, std::vector<std::string>& notes) {
   const ObjectSpec& spec = object.spec;
   const double metres = metresOf(spec.unit);
   Extent extent;
   for (Vec3d& v : mesh.vertices) {
-    v = turnedUp(v * metres, spec.up);
+    v = turnedUp(Vec3d{v.x * object.stretch.x, v.y * object.stretch.y, v.z * object.stretch.z} * metres, spec.up);
     extent.include(v * spec.scale);
   }
   const double size = extent.largest();
-  if (spec.scale != 1.0 || spec.unit != LengthUnit::Metre || (size < kHugeObject_m && size > kTinyObject_m)) return;
+  const bool is_stretched = object.stretch != Vec3d{1, 1, 1};
+  if (spec.scale != 1.0 || is_stretched || spec.unit != LengthUnit::Metre || (size < kHugeObject_m && size > kTinyObject_m)) return;
   notes.push_back(fmt::format(
       "{}: mesh {} is {:.4g} m wide: {}", object.place, object.mesh.filename().string(), size,
       size > 1.0 ? "is it in millimetres? Then say unit = \"mm\""
@@ -88,7 +68,7 @@ void place(TriangleMesh& mesh, const PlacedObject& object, std::vector<std::stri
 
 class MeshLoading {
  public:
-  MeshLoading(SceneFile& file, const SceneLoading& how) : file_(file), how_(how) {}
+  MeshLoading(SceneFile& file, const SceneLoading& how) : file_(file), how_(how), notes_(file.notes) {}
 
   Result<std::vector<std::string>> run() {
     std::vector<PlacedObject> all;
@@ -96,7 +76,7 @@ class MeshLoading {
     for (std::size_t i = 0; i < file_.objects.size(); ++i) {
       PlacedObject& object = file_.objects[i];
       object.number = i;
-      if (object.spec.shape != Shape::Mesh) {
+      if (object.spec.shape != Shape::Mesh || object.triangles != nullptr) {
         all.push_back(std::move(object));
         continue;
       }
@@ -207,6 +187,26 @@ class MeshLoading {
 };
 
 }  // namespace
+
+TriangleMesh partOf(const TriangleMesh& mesh, std::size_t first, std::size_t count) {
+  TriangleMesh part;
+  std::unordered_map<std::uint32_t, std::uint32_t> taken;
+  for (std::size_t i = first; i < first + count; ++i) {
+    auto& triangle = part.triangles.emplace_back();
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = mesh.triangles[i][k];
+      const auto [found, is_new] = taken.emplace(vertex, static_cast<std::uint32_t>(part.vertices.size()));
+      if (is_new) part.vertices.push_back(mesh.vertices[vertex]);
+      triangle[k] = found->second;
+    }
+    if (!mesh.places.empty()) part.places.push_back(mesh.places[i]);
+  }
+  const bool all_have_places = std::ranges::all_of(part.places, [](const auto& places) {
+    return std::ranges::all_of(places, [](TexturePlace at) { return std::isfinite(at.u) && std::isfinite(at.v); });
+  });
+  if (!all_have_places) part.places.clear();
+  return part;
+}
 
 Vec3d turnedUp(Vec3d p, Up up) {
   switch (up) {

@@ -6,8 +6,8 @@
 
 #include <toftwin/result.h>
 
-#include "sim/tracer/scene.h"
 #include "sim/tracer/scene_file.h"
+#include "sim/tracer/scene_loading.h"
 
 namespace toftwin::sim {
 
@@ -20,6 +20,9 @@ Result<std::vector<std::string>> readMeshes(SceneFile& file, const SceneLoading&
 /// A material for what a mesh file says of a surface: metals are rough-metal, what is fully rough is lambertian,
 /// all else is rough-dielectric. The mean of the base colour stands for the albedo at the camera's wavelength.
 MaterialSpec materialOf(const meshes::Surface& surface);
+
+/// Some of a mesh's triangles, with the vertices that they use; places on a picture only if all of them have one.
+TriangleMesh partOf(const TriangleMesh& mesh, std::size_t first, std::size_t count);
 
 /// The matrix of `up`: takes the file's coordinates to the object's.
 Vec3d turnedUp(Vec3d p, Up up);
