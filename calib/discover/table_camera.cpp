@@ -12,15 +12,15 @@
 #include "calib/discover/curve.h"
 #include "calib/discover/headers.h"
 #include "calib/discover/table_words.h"
+#include "sim/effects/learned/covariates.h"
+#include "sim/effects/learned/tables.h"
 
 namespace toftwin::discover {
 namespace {
 
-using sim::LearnedOver;
-
 /// A column as the simulator knows it: its value there is so many times the column's.
 struct Known {
-  LearnedOver over = LearnedOver::Nothing;
+  std::string covariate{};  ///< its name there
   double factor = 1.0;
   std::string as{};  ///< where the header does not say it outright
 };
@@ -30,11 +30,9 @@ std::optional<double> unitIn(const std::map<std::string, double>& units, const s
   return at == units.end() ? std::nullopt : std::optional{at->second};
 }
 
-/// As `learned_range` has it.
-std::optional<LearnedOver> overNamed(const std::string& name) {
-  for (const auto& [word, over] : sim::kLearnedWords)
-    if (name == word && over >= LearnedOver::Time && over <= LearnedOver::Radius) return over;
-  return std::nullopt;
+bool isSimulators(const std::string& name) {
+  const sim::LearnedCovariate* known = sim::learnedCovariate(name);
+  return known != nullptr && sim::isKnownAt(terms::Stage::Range, *known);
 }
 
 std::optional<Known> knownAs(const TableDiscovery& d, const TableCovariate& column) {
@@ -42,23 +40,23 @@ std::optional<Known> knownAs(const TableDiscovery& d, const TableCovariate& colu
   const std::string unit = discover::unitOf(name);
   if (name == d.open.reference_name) {
     const auto per_metre = unitsPerMetre(unit);
-    return per_metre ? std::optional{Known{LearnedOver::Range, 1.0 / *per_metre, "the range"}} : std::nullopt;
+    return per_metre ? std::optional{Known{"range_m", 1.0 / *per_metre, "the range"}} : std::nullopt;
   }
-  if (const auto over = overNamed(name)) return Known{*over};
+  if (isSimulators(name)) return Known{name};
   static const std::map<std::string, double> kSeconds{{"s", 1.0}, {"ms", 1e-3}, {"min", 60.0}, {"h", 3600.0}};
   static const std::map<std::string, double> kMicroseconds{{"us", 1.0}, {"ms", 1e3}, {"s", 1e6}};
   static const std::map<std::string, double> kKilolux{{"klx", 1.0}, {"lx", 1e-3}};
   if (column.nature == Nature::Time) {
     const auto seconds = column.first ? std::optional{1.0} : unitIn(kSeconds, unit);
-    return seconds ? std::optional{Known{LearnedOver::Time, *seconds, "the time since power-on"}} : std::nullopt;
+    return seconds ? std::optional{Known{"time_s", *seconds, "the time since power-on"}} : std::nullopt;
   }
   if (const auto microseconds = unitIn(kMicroseconds, unit); microseconds && saysWord(name, {"exposure", "integration"}))
-    return Known{LearnedOver::Exposure, *microseconds, "the exposure"};
-  if (const auto kilolux = unitIn(kKilolux, unit)) return Known{LearnedOver::Ambient, *kilolux, "the ambient light"};
+    return Known{"exposure_us", *microseconds, "the exposure"};
+  if (const auto kilolux = unitIn(kKilolux, unit)) return Known{"ambient_klx", *kilolux, "the ambient light"};
   if (saysWord(name, {"temperature", "temp", "temperatur"}) && (unit.empty() || unit == "c")) {
     if (saysWord(name, {"illumination", "led", "laser", "emitter"}))
-      return Known{LearnedOver::Illumination, 1.0, "the illumination's temperature"};
-    return Known{LearnedOver::Sensor, 1.0, "the sensor's temperature"};
+      return Known{"temperature_illumination_c", 1.0, "the illumination's temperature"};
+    return Known{"temperature_sensor_c", 1.0, "the sensor's temperature"};
   }
   return std::nullopt;
 }
@@ -72,9 +70,8 @@ std::optional<Known> knownColumn(const TableDiscovery& d, const std::string& nam
     notes.push_back(fmt::format("camera.toml takes {} for {}", name, known->as));
   if (!known)
     notes.push_back(fmt::format("what goes with {} is not in camera.toml: the simulator knows no such thing, or not by that "
-                                "header (time_s, temperature_sensor_c, temperature_illumination_c, ambient_klx, exposure_us, "
-                                "amplitude_e, column, row, radius_px; the reference is the range)",
-                                name));
+                                "header ({}; the reference is the range)",
+                                name, sim::learnedCovariateNames(terms::Stage::Range)));
   return known;
 }
 
@@ -92,7 +89,9 @@ std::vector<double> times(std::vector<double> values, double factor) {
   return values;
 }
 
-FittedEffect fitted(sim::LearnedRange table) { return {sim::AnyEffect{std::move(table)}, {}}; }
+FittedEffect fitted(const sim::KnotTable& table, const std::vector<double>& offsets_mm) {
+  return {sim::AnyEffect{sim::Learned{.title = {}, .terms = sim::termsOf(table, offsets_mm, terms::Quantity::RangeMm)}}, {}};
+}
 
 /// As a table over its one or two covariates; nothing where one of them is not known.
 std::optional<FittedEffect> tableOf(const TableDiscovery& d, const Effect& effect, double to_mm,
@@ -106,21 +105,22 @@ std::optional<FittedEffect> tableOf(const TableDiscovery& d, const Effect& effec
     known.push_back(*std::move(one));
     points.push_back(apart(pointsOf(d, effect, name)));
   }
-  sim::LearnedRange table{.over = known[0].over, .knots = times(points[0], known[0].factor), .offsets_mm = {}};
-  if (known.size() == 2) table.and_over = known[1].over, table.and_knots = times(points[1], known[1].factor);
+  sim::KnotTable table{.over = known[0].covariate, .knots = times(points[0], known[0].factor)};
+  if (known.size() == 2) table.and_over = known[1].covariate, table.and_knots = times(points[1], known[1].factor);
+  std::vector<double> offsets_mm;
   const Level level = levelOf(effect, d.open);
   for (const double x : points[0]) {
     std::map<std::string, double> at{{effect.covariates[0], x}};
     if (known.size() == 1) {
-      table.offsets_mm.push_back(to_mm * effectAt(effect, at, level).value);
+      offsets_mm.push_back(to_mm * effectAt(effect, at, level).value);
       continue;
     }
     for (const double y : points[1]) {
       at[effect.covariates[1]] = y;
-      table.offsets_mm.push_back(to_mm * effectAt(effect, at, level).value);
+      offsets_mm.push_back(to_mm * effectAt(effect, at, level).value);
     }
   }
-  return fitted(std::move(table));
+  return fitted(table, offsets_mm);
 }
 
 /// Offset and gain, which are the camera's where rows have one offset; effects are written above their means.
@@ -139,13 +139,13 @@ std::optional<FittedEffect> zeroOf(const TableDiscovery& d, double to_mm, std::v
   const auto per_metre = unitsPerMetre(discover::unitOf(d.open.reference_name));
   if (d.open.reference.empty() || !per_metre) {
     if (!offset) return std::nullopt;
-    return fitted({.knots = {1.0}, .offsets_mm = {to_mm * *offset}});
+    return fitted({.over = "range_m", .knots = {1.0}}, {to_mm * *offset});
   }
   const auto [nearest, farthest] = std::ranges::minmax(d.open.reference);
   if (!(nearest < farthest)) return std::nullopt;
   const double middle = compare::quantile(d.open.reference, 0.5);
   const auto at = [&](double x) { return to_mm * (offset.value_or(0.0) + gain * (x - middle)); };
-  return fitted({.knots = {nearest / *per_metre, farthest / *per_metre}, .offsets_mm = {at(nearest), at(farthest)}});
+  return fitted({.over = "range_m", .knots = {nearest / *per_metre, farthest / *per_metre}}, {at(nearest), at(farthest)});
 }
 
 }  // namespace

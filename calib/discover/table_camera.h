@@ -14,7 +14,7 @@ struct TableCamera {
   std::string toml{};
   std::vector<std::string> notes{};  ///< what columns were taken for, and what could not be written
 };
-/// The camera with a `learned_range` for each effect whose columns the simulator knows, and one for offset and gain where
+/// The camera with a `learned` effect for each effect whose columns the simulator knows, and one for offset and gain where
 /// rows have one offset. Columns are known by the simulator's names (time_s, temperature_sensor_c, …) and by what headers
 /// say; the reference is the range. Error: errors of the table are no lengths.
 Result<TableCamera> cameraWith(const TableDiscovery& discovery, const CameraText& camera);

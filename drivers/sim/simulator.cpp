@@ -401,6 +401,7 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   chosen->keys.applyTo(request);
   if (const auto missing = sim::missingLight(chosen->scene, request.emitters, chosen->keys.mode == Mode::RealTime))
     logging::warn("{}: {}", table.place("scene"), *missing);
+  for (const std::string& note : chosen->model.notes()) logging::warn("{}", note);
   if (const auto off_axis = sim::lensOffAxis(chosen->model.camera()))
     logging::warn("{}: {}", table.place(table.has("camera") ? "camera" : "uri"), *off_axis);
   for (const std::string& note : chosen->scene.notes()) logging::warn("{}: {}", table.place("scene"), note);

@@ -94,9 +94,7 @@ const E* as(const AnyEffect& effect) {
   return std::get_if<E>(&effect);
 }
 
-bool actsOnSamples(const AnyEffect& effect) {
-  return std::visit([]<class E>(const E&) { return std::is_same_v<ImageOf<E>, Samples>; }, effect);
-}
+bool actsOnSamples(const AnyEffect& effect) { return actsOn<Samples>(effect); }
 
 /// The next effect on samples from `place` on.
 std::size_t nextOnSamples(std::span<const AnyEffect> effects, std::size_t place) {

@@ -49,6 +49,10 @@ class Covariates {
   }
   [[nodiscard]] constexpr bool empty() const { return bits_ == 0; }
   constexpr bool operator==(const Covariates&) const = default;
+  constexpr Covariates& operator|=(const Covariates& others) {
+    bits_ |= others.bits_;
+    return *this;
+  }
 
  private:
   unsigned bits_ = 0;

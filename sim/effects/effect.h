@@ -18,6 +18,7 @@
 #include "sim/images/light.h"
 #include "sim/images/range.h"
 #include "sim/images/samples.h"
+#include "sim/terms/term.h"
 
 namespace toftwin::sim {
 
@@ -43,6 +44,7 @@ struct Conditions {
   const CameraInfo& camera;
   int left = 0, top = 0;
   History before{};
+  std::uint64_t frame = 0;  ///< its number
 
   /// The number of the pixel (x, y) of the image within the full image: the key of its noise.
   [[nodiscard]] std::uint32_t pixel(int x, int y) const {
@@ -52,31 +54,65 @@ struct Conditions {
 };
 
 /// An imperfection of a camera: an aggregate of parameters with unit types. It acts on exactly one
-/// of Light, Samples and RangeImage, by a pure function of the image, the conditions and the keyed
+/// of Light, Samples and RangeImage, which its type or its parameters say, by a pure function of the image, the conditions and the keyed
 /// random numbers. See docs/add-an-effect.md.
 template <class E, class On>
 concept ActsOn = requires(const E& effect, On image, const Conditions& now, const Random& random) {
   { effect.apply(std::move(image), now, random) } -> std::same_as<On>;
 };
 
+/// One whose parameters say on which of them it acts: `stage()`, and what its output then depends on: `explains()`;
+/// `about.explains` is of the defaults. On an image of another stage it does nothing.
+template <class E>
+concept ActsAtItsStage = ActsOn<E, Light> && ActsOn<E, Samples> && ActsOn<E, RangeImage> && requires(const E& effect) {
+  { effect.stage() } -> std::same_as<terms::Stage>;
+  { effect.explains() } -> std::same_as<Covariates>;
+};
+
 template <class E>
 concept Effect = std::is_aggregate_v<E> && requires {
   { E::about } -> std::convertible_to<About>;
   { E::none() } -> std::same_as<E>;
-} &&((ActsOn<E, Light> ? 1 : 0) + (ActsOn<E, Samples> ? 1 : 0) + (ActsOn<E, RangeImage> ? 1 : 0) ==
-     1);
+} &&(ActsAtItsStage<E> ||
+     (ActsOn<E, Light> ? 1 : 0) + (ActsOn<E, Samples> ? 1 : 0) + (ActsOn<E, RangeImage> ? 1 : 0) == 1);
 
-/// The image type an effect acts on.
+/// The image type an effect acts on, of one that its type says it of.
 template <Effect E>
-using ImageOf = std::conditional_t<ActsOn<E, Light>, Light,
-                                   std::conditional_t<ActsOn<E, Samples>, Samples, RangeImage>>;
+requires(!ActsAtItsStage<E>) using ImageOf =
+    std::conditional_t<ActsOn<E, Light>, Light, std::conditional_t<ActsOn<E, Samples>, Samples, RangeImage>>;
+
+template <class On>
+inline constexpr terms::Stage kStageOf = std::is_same_v<On, Light>     ? terms::Stage::Light
+                                         : std::is_same_v<On, Samples> ? terms::Stage::Samples
+                                                                       : terms::Stage::Range;
+
+/// Where in the chain this effect acts.
+template <Effect E>
+terms::Stage stageOf(const E& effect) {
+  if constexpr (ActsAtItsStage<E>) return effect.stage();
+  else return kStageOf<ImageOf<E>>;
+}
+
+/// Whether this effect acts on that type of image.
+template <class On, Effect E>
+bool actsOn(const E& effect) {
+  return stageOf(effect) == kStageOf<On>;
+}
+
+/// What this effect's output depends on.
+template <Effect E>
+Covariates explainsOf(const E& effect) {
+  if constexpr (ActsAtItsStage<E>) return effect.explains();
+  else return E::about.explains;
+}
 
 /// Where in the chain an effect acts, in words.
 template <Effect E>
-constexpr std::string_view stageOf() {
-  if constexpr (ActsOn<E, Light>) return "light";
-  if constexpr (ActsOn<E, Samples>) return "samples";
-  return "range";
+constexpr std::string_view stageInWords() {
+  if constexpr (ActsAtItsStage<E>) return "light, samples or range";
+  else if constexpr (ActsOn<E, Light>) return "light";
+  else if constexpr (ActsOn<E, Samples>) return "samples";
+  else return "range";
 }
 
 /// A closed list of effects.

@@ -20,13 +20,7 @@
 #include "sim/effects/harmonics.h"
 #include "sim/effects/internal_reflection.h"
 #include "sim/effects/lag.h"
-#include "sim/effects/learned_columns.h"
-#include "sim/effects/learned_light.h"
-#include "sim/effects/learned_mirror.h"
-#include "sim/effects/learned_neighbours.h"
-#include "sim/effects/learned_range.h"
-#include "sim/effects/learned_shift.h"
-#include "sim/effects/learned_smear.h"
+#include "sim/effects/learned/learned.h"
 #include "sim/effects/lens_ghost.h"
 #include "sim/effects/lens_scatter.h"
 #include "sim/effects/low_amplitude_filter.h"
@@ -57,17 +51,27 @@ using AllEffects = EffectList<
     Harmonics, RiseDrift, DutyDrift, ThermalDelay, FrequencyOffset,                     // light: emission
     AmbientLight,                                                                       // the scene
     DistortionMisfit, Defocus, Vignetting, LensScatter, LensGhost, InternalReflection,  // optics
-    LearnedShift, LearnedNeighbours, LearnedMirror, LearnedLight,  // what has no name yet
     PropagationDelay, FixedPatternPhase, StepPhase,                // demodulation
     Lag, ShotNoise, AmbientSuppression, Saturation,                // samples: the pixel
-    Nonlinearity, SampleGain, SampleOffset, ColumnComb, LearnedColumns, ReadNoise, Quantisation,
+    Nonlinearity, SampleGain, SampleOffset, ColumnComb, ReadNoise, Quantisation,
     Companding,                                                                        // the converter
     RangeNoise, WarmUp, TimeWalk, ClockScale, ResidualDrift, Delay, CalibrationTable,  // range: decoding
-    LearnedRange, LearnedSmear,                                                        // what has no name yet
     LowAmplitudeFilter, FlyingPixelFilter, EdgeFilter, MedianFilter, BilateralFilter,
-    TemporalFilter>;  // filters
+    TemporalFilter,  // filters
+    Learned>;        // what has no name yet, at any stage
 
 /// One effect of a model.
 using AnyEffect = AllEffects::Any;
+
+inline terms::Stage stageOf(const AnyEffect& any) {
+  return std::visit([](const auto& effect) { return stageOf(effect); }, any);
+}
+template <class On>
+bool actsOn(const AnyEffect& any) {
+  return stageOf(any) == kStageOf<On>;
+}
+inline Covariates explainsOf(const AnyEffect& any) {
+  return std::visit([](const auto& effect) { return explainsOf(effect); }, any);
+}
 
 }  // namespace toftwin::sim

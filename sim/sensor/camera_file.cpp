@@ -9,13 +9,42 @@
 #include <cstdint>
 #include <functional>
 
+#include "protocol/settings/describe.h"
 #include "sim/sensor/correlate.h"
+#include "sim/sensor/older_learned.h"
 
 namespace toftwin::sim {
 namespace {
 
-void readEffect(settings::Table& table, std::vector<AnyEffect>& effects) {
+void checkProblem(settings::Table& table, const AnyEffect& any) {
+  std::visit(
+      [&]<class E>(const E& effect) {
+        if constexpr (requires { effect.problem(); }) {
+          if (const std::string problem = effect.problem(); !problem.empty()) table.complain("", problem);
+        }
+      },
+      any);
+}
+
+/// Reads a type of effect that there is no longer as the one that took its place.
+AnyEffect readOlder(const std::string& type, settings::Table& table, std::vector<std::string>& notes) {
+  Learned learned = readOlderLearned(type, table);
+  std::string texts;
+  for (const std::string& text : learned.terms.texts()) texts += (texts.empty() ? "" : ", ") + settings::toToml(text);
+  constexpr std::size_t kLongest = 200;
+  if (texts.size() > kLongest) texts = texts.substr(0, texts.find(',')) + fmt::format(", … ({} terms)", learned.terms.list().size());
+  notes.push_back(fmt::format("{}: type = \"{}\" is of an older version and read as type = \"learned\", terms = [{}]",
+                              table.place("type"), type, texts));
+  return learned;
+}
+
+void readEffect(settings::Table& table, std::vector<AnyEffect>& effects, std::vector<std::string>& notes) {
   const auto type = table.text("type");
+  if (type && isOlderLearned(*type)) {
+    effects.push_back(readOlder(*type, table, notes));
+    checkProblem(table, effects.back());
+    return;
+  }
   bool is_known = false;
   std::string names;
   AllEffects::forEach([&]<class E>() {
@@ -24,10 +53,8 @@ void readEffect(settings::Table& table, std::vector<AnyEffect>& effects) {
     is_known = true;
     E effect{};
     table.read(effect);
-    if constexpr (requires { effect.problem(); }) {
-      if (const std::string problem = effect.problem(); !problem.empty()) table.complain("", problem);
-    }
     effects.emplace_back(effect);
+    checkProblem(table, effects.back());
   });
   if (!is_known) {
     table.complain("type", type
@@ -86,8 +113,7 @@ void checkHarmonics(settings::Table& table, const CameraFile& file,
 void checkTemporalFilter(settings::Table& table, const std::vector<AnyEffect>& effects) {
   bool is_there = false;
   for (const AnyEffect& any : effects) {
-    const bool acts_on_range = std::visit(
-        []<class E>(const E&) { return std::is_same_v<ImageOf<E>, RangeImage>; }, any);
+    const bool acts_on_range = actsOn<RangeImage>(any);
     if (is_there && acts_on_range) {
       table.complain("effect", "temporal_filter must be the last effect on ranges");
       return;
@@ -178,7 +204,7 @@ Duration CameraFile::exposureTime() const {
 CameraFile readCameraFile(settings::Table& table, std::vector<AnyEffect>& effects) {
   CameraFile file;
   table.read(file);
-  for (settings::Table& effect : table.tables("effect")) readEffect(effect, effects);
+  for (settings::Table& effect : table.tables("effect")) readEffect(effect, effects, file.notes);
   if (file.emitters.empty()) table.complain("", "has no [[emitter]]: a camera needs at least one");
   checkKind(table, file);
   for (const auto& emitter : file.emitters) {

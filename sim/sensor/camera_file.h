@@ -223,6 +223,8 @@ struct CameraFile {
   Thermal thermal;
   DecodeSettings decoder;
   std::vector<Color> colors;  ///< at most one
+  /// For people: what an older version wrote and is read as something else, with its place in the file. No keys.
+  std::vector<std::string> notes{};
 
   [[nodiscard]] bool isPulsed() const { return !pulses.empty(); }
   /// From the start of a frame's first raw exposure to the end of its last.

@@ -56,11 +56,7 @@ std::vector<Image<std::complex<float>>> pixelTurnsOf(const std::vector<AnyEffect
                                                      const std::vector<Response>& responses,
                                                      const CameraInfo& camera) {
   const auto isMeasured = [](const AnyEffect& any) {
-    return std::visit(
-        []<class E>(const E&) {
-          return std::is_same_v<ImageOf<E>, Light> && E::about.explains == Covariates{Covariate::Position};
-        },
-        any);
+    return actsOn<Light>(any) && explainsOf(any) == Covariates{Covariate::Position};
   };
   if (std::ranges::none_of(effects, isMeasured)) return {};
   Light light;
@@ -75,7 +71,7 @@ std::vector<Image<std::complex<float>>> pixelTurnsOf(const std::vector<AnyEffect
     if (!isMeasured(effects[place])) continue;
     std::visit(
         [&]<class E>(const E& effect) {
-          if constexpr (std::is_same_v<ImageOf<E>, Light>)
+          if constexpr (ActsOn<E, Light>)
             light = effect.apply(std::move(light), now, Random{0, 0, effectKey(E::about.name, place)});
         },
         effects[place]);

@@ -47,6 +47,9 @@ class CanonicalText {
   template <class Text>
   requires std::is_same_v<Text, std::string>
   void text(const char* name, Text& value, const char*) { line(name, settings::toToml(value)); }
+  void texts(const char* name, std::vector<std::string>& values, const char*) {
+    for (const std::string& value : values) line(name, settings::toToml(value));
+  }
   void flag(const char* name, bool& value, const char*) { line(name, value ? "true" : "false"); }
   template <class Enum>
   void choice(const char* name, Enum& value,
@@ -99,6 +102,8 @@ class NumberSetter {
   }
   template <class Values>
   void numbers(const char*, Values&, Bounds, const char*) {}  // a list is no number
+  void text(const char*, std::string&, const char*) {}
+  void texts(const char*, std::vector<std::string>&, const char*) {}
   template <class Enum>
   void choice(const char*, Enum&, std::initializer_list<std::pair<const char*, Enum>>, const char*) {}
 

@@ -27,7 +27,7 @@ Of applyAll(Of image, const std::vector<AnyEffect>& effects, const Conditions& n
   for (std::size_t place = 0; place < effects.size(); ++place) {
     std::visit(
         [&]<class E>(const E& effect) {
-          if constexpr (std::is_same_v<ImageOf<E>, Of>) {
+          if constexpr (ActsOn<E, Of>) {
             image = effect.apply(std::move(image), now,
                                  Random{seed, frame, effectKey(E::about.name, place)});
           }
@@ -53,7 +53,7 @@ Samples applyOnSamples(Samples samples, const std::vector<AnyEffect>& effects, c
     }
     std::visit(
         [&]<class E>(const E& effect) {
-          if constexpr (std::is_same_v<ImageOf<E>, Samples>)
+          if constexpr (ActsOn<E, Samples>)
             samples = effect.apply(std::move(samples), now, randomOf(E::about.name, place));
         },
         effects[place]);
@@ -145,7 +145,7 @@ std::vector<const AnyEffect*> actingOnLight(const std::vector<AnyEffect>& effect
                                             const Conditions& now) {
   std::vector<const AnyEffect*> acting;
   for (const AnyEffect& any : effects) {
-    if (!std::visit([]<class E>(const E&) { return std::is_same_v<ImageOf<E>, Light>; }, any)) continue;
+    if (!actsOn<Light>(any)) continue;
     const auto* ambient = std::get_if<AmbientLight>(&any);
     if (ambient == nullptr || ambient->shines(light, now)) acting.push_back(&any);
   }
@@ -153,8 +153,9 @@ std::vector<const AnyEffect*> actingOnLight(const std::vector<AnyEffect>& effect
 }
 
 bool anyAsksForTheScene(const std::vector<AnyEffect>& effects) {
-  return std::ranges::any_of(effects,
-                             [](const AnyEffect& any) { return std::holds_alternative<LearnedLight>(any); });
+  return std::ranges::any_of(effects, [](const AnyEffect& any) {
+    return std::holds_alternative<Learned>(any) && actsOn<Light>(any);
+  });
 }
 
 template <class T>
@@ -252,7 +253,7 @@ SensorModel::Exposed SensorModel::expose(const Light& light, const Moment& momen
     return readOut(collect(light, moment, seed, frame, region_x, region_y), moment, seed, frame, region_x,
                    region_y, before);
   }
-  const Conditions now{moment, impl_->camera, region_x, region_y, before};
+  const Conditions now{moment, impl_->camera, region_x, region_y, before, frame};
   Samples counted = rowsOfSamples(*impl_, light.width(), light.height());
   WholeSamples whole{counted};
   countLight(light, now, seed, frame, [&](int top, const Samples& part) { whole.take(top, part); });
@@ -267,7 +268,7 @@ RangeImage SensorModel::measure(const Light& light, const Moment& moment, std::u
   const bool is_whole = light.width() == impl_->camera.width && light.height() == impl_->camera.height;
   if (!countsInStrips() || !is_whole || impl_->decoder.algorithm != DecodeSettings::Algorithm::KinectV2)
     return expose(light, moment, seed, frame).range;
-  const Conditions now{moment, impl_->camera};
+  const Conditions now{moment, impl_->camera, 0, 0, {}, frame};
   KinectV2Decoder decoder{rowsOfSamples(*impl_, 0, 0), light.width(), light.height(), impl_->decoder, impl_->rays};
   countLight(light, now, seed, frame,
              [&](int top, const Samples& part) { decoder.take(top, part, 0, part.height()); });
@@ -308,7 +309,7 @@ Light SensorModel::lightAfterEffects(const Light& light, const Conditions& now, 
 
 Samples SensorModel::collect(const Light& light, const Moment& moment, std::uint64_t seed,
                              std::uint64_t frame, int region_x, int region_y) const {
-  const Conditions now{moment, impl_->camera, region_x, region_y};
+  const Conditions now{moment, impl_->camera, region_x, region_y, {}, frame};
   if (actingOnLight(impl_->effects, light, now).empty()) return samplesOf(*impl_, light);
   return samplesOf(*impl_, lightAfterEffects(light, now, seed, frame));
 }
@@ -323,7 +324,7 @@ SensorModel::Exposed SensorModel::readOut(Samples collected, const Moment& momen
 
 SensorModel::Exposed SensorModel::decoded(Samples collected, const Moment& moment, std::uint64_t seed,
                                           std::uint64_t frame, int region_x, int region_y, History before) const {
-  const Conditions now{moment, impl_->camera, region_x, region_y, before};
+  const Conditions now{moment, impl_->camera, region_x, region_y, before, frame};
   const std::size_t count = exposureCount();
   if (count == 1) return readOutOne(std::move(collected), 0, now, seed, frame);
   std::vector<Samples> samples;
@@ -344,7 +345,7 @@ SensorModel::Exposed SensorModel::decoded(Samples collected, const Moment& momen
 
 RangeImage SensorModel::finished(RangeImage decoded, const Moment& moment, std::uint64_t seed, std::uint64_t frame,
                                  int region_x, int region_y, History before) const {
-  const Conditions now{moment, impl_->camera, region_x, region_y, before};
+  const Conditions now{moment, impl_->camera, region_x, region_y, before, frame};
   return applyAll(std::move(decoded), impl_->effects, now, seed, frame);
 }
 

@@ -126,6 +126,7 @@ Result<SensorModel> SensorModel::parse(std::string_view toml, const std::filesys
 }
 
 const std::string& SensorModel::model() const { return impl_->file.model; }
+const std::vector<std::string>& SensorModel::notes() const { return impl_->file.notes; }
 const CameraInfo& SensorModel::camera() const { return impl_->camera; }
 const std::string& SensorModel::id() const { return impl_->id; }
 const std::vector<AnyEffect>& SensorModel::effects() const { return impl_->effects; }
@@ -168,11 +169,7 @@ std::vector<SeenHarmonic> SensorModel::correlatedTerms() const {
     return std::vector<SeenHarmonic>(impl_->responses.size() * static_cast<std::size_t>(harmonics), Harmonic::Seen);
   // Others than these may treat harmonics each in its own way.
   const bool can_fold = std::ranges::all_of(impl_->effects, [](const AnyEffect& any) {
-    return std::visit(
-        []<class E>(const E&) {
-          return !std::is_same_v<ImageOf<E>, Light> || std::is_same_v<E, LensScatter> || std::is_same_v<E, AmbientLight>;
-        },
-        any);
+    return !actsOn<Light>(any) || std::holds_alternative<LensScatter>(any) || std::holds_alternative<AmbientLight>(any);
   });
   if (can_fold) return foldedTerms(impl_->responses, harmonics, impl_->file.sampling.steps);
   const std::vector<Harmonic> terms = sim::correlatedTerms(impl_->responses, harmonics);
@@ -231,24 +228,16 @@ TraceRequest SensorModel::traceRequest() const {
 }
 
 bool SensorModel::collectsTheSameEachFrame() const {
-  for (const AnyEffect& any : impl_->effects) {
-    const bool changes = std::visit(
-        []<class E>(const E&) {
-          constexpr Covariates on = E::about.explains;
-          return std::is_same_v<ImageOf<E>, Light> &&
-                 (on.contains(Covariate::Frame) || on.contains(Covariate::Time) ||
-                  on.contains(Covariate::Temperature));
-        },
-        any);
-    if (changes) return false;
-  }
-  return true;
+  return std::ranges::none_of(impl_->effects, [](const AnyEffect& any) {
+    const Covariates on = explainsOf(any);
+    return actsOn<Light>(any) && (on.contains(Covariate::Frame) || on.contains(Covariate::Time) ||
+                                  on.contains(Covariate::Temperature));
+  });
 }
 
 bool SensorModel::remembers() const {
   return std::ranges::any_of(impl_->effects, [](const AnyEffect& any) {
-    return std::visit(
-        []<class E>(const E&) { return E::about.explains.contains(Covariate::History); }, any);
+    return explainsOf(any).contains(Covariate::History);
   });
 }
 

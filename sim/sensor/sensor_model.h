@@ -52,6 +52,8 @@ class SensorModel {
   static Result<std::string> presetText(std::string_view name);
 
   [[nodiscard]] const std::string& model() const;
+  /// For people: what of the camera file is of an older version and was read as something else.
+  [[nodiscard]] const std::vector<std::string>& notes() const;
   [[nodiscard]] const CameraInfo& camera() const;
   /// Content hash of everything that the camera file says; 32 hex digits.
   [[nodiscard]] const std::string& id() const;

@@ -161,20 +161,21 @@ bool hasLoop(Basis basis) {
   return std::ranges::find(kWithLoops, basis) != std::end(kWithLoops);
 }
 
-/// From knot `from` on; one number for x at each place of a table that both ends of the curve are in.
-struct CurveTables {
-  const double *knots, *from, *values, *slopes;
-  const std::int32_t* before;
-  double first, intervals_per_x, last_interval;
-};
-
-TOFTWIN_SIMD void multiplyCurveLoop(const CurveTables& t, const double* x, double* product, std::size_t count) {
+/// A curve's tables; see BasisOfMany. Each is a parameter of its own that nobody else writes to, so that GCC gathers values
+/// several at a time.
+TOFTWIN_SIMD void multiplyCurveLoop(const double* __restrict knots, const double* __restrict from,
+                                    const double* __restrict values, const double* __restrict slopes,
+                                    const std::int32_t* __restrict before, double first, double intervals_per_x,
+                                    double last_interval, const double* __restrict x, double* __restrict product,
+                                    std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) {
     const double at = x[i];
-    const double interval = std::min(t.last_interval, std::max(0.0, (at - t.first) * t.intervals_per_x));  // 0 of NaN
-    const std::int32_t before = t.before[static_cast<std::int32_t>(interval)];
-    const std::int32_t knot = before + (at >= t.knots[before + 1] ? 1 : 0);
-    product[i] *= finiteOrNan(t.values[knot] + (at - t.from[knot]) * t.slopes[knot]);
+    double interval = (at - first) * intervals_per_x;
+    interval = interval > 0.0 ? interval : 0.0;  // also of NaN
+    interval = interval < last_interval ? interval : last_interval;
+    const std::int32_t below = before[static_cast<std::int32_t>(interval)];
+    const std::int32_t knot = below + (at >= knots[below + 1] ? 1 : 0);
+    product[i] *= finiteOrNan(values[knot] + (at - from[knot]) * slopes[knot]);
   }
 }
 
@@ -213,9 +214,8 @@ BasisOfMany::BasisOfMany(const Factor& factor) : basis_(factor.basis), numbers_(
 }
 
 void BasisOfMany::multiplyCurve(std::span<const double> x, std::span<double> product) const {
-  const CurveTables tables{knots_.data(),  from_.data(),   values_.data(),   slopes_.data(),
-                           before_.data(), first_,         intervals_per_x_, static_cast<double>(before_.size() - 1)};
-  multiplyCurveLoop(tables, x.data(), product.data(), x.size());
+  multiplyCurveLoop(knots_.data(), from_.data(), values_.data(), slopes_.data(), before_.data(), first_, intervals_per_x_,
+                    static_cast<double>(before_.size() - 1), x.data(), product.data(), x.size());
 }
 
 void BasisOfMany::multiply(std::span<const double> x, std::span<double> product) const {

@@ -113,10 +113,10 @@ void ImageTerms::setFrame(const Lookup& lookup) {
 /// The covariates of a row's pixels, each written once when it is first needed, and room for an argument.
 class ImageTerms::RowValues {
  public:
-  RowValues(const PixelRow& pixels, std::size_t width, std::size_t count)
-      : pixels_(pixels), rows_(count), argument_(width) {}
+  RowValues(const PixelRow& pixels, std::size_t size, std::size_t covariates)
+      : pixels_(pixels), rows_(covariates), argument_(size) {}
 
-  std::span<const double> argumentOf(const PixelFactor& factor, std::size_t y) {
+  std::span<const double> argumentOf(const PixelFactor& factor, const Pixels& at, std::size_t width) {
     const bool is_plain = factor.parts.size() == 1 && factor.parts[0].weight == 1.0 && factor.still.empty() &&
                           factor.of_frame.parts.empty();
     if (is_plain) return rowOf(factor.parts[0].which);
@@ -126,7 +126,7 @@ class ImageTerms::RowValues {
       for (std::size_t x = 0; x < argument_.size(); ++x) argument_[x] += weight * row[x];
     }
     for (const Layer& layer : factor.still)
-      for (std::size_t x = 0; x < argument_.size(); ++x) argument_[x] += layer.at(x, y, argument_.size());
+      for (std::size_t i = 0; i < argument_.size(); ++i) argument_[i] += layer.at(at.column(i), at.y, width);
     return argument_;
   }
 
@@ -144,22 +144,35 @@ class ImageTerms::RowValues {
   std::vector<double> argument_;
 };
 
-void ImageTerms::addTerm(const Compiled& term, std::size_t y, RowValues& values, std::span<double> product,
+void ImageTerms::addTerm(const Compiled& term, const Pixels& at, RowValues& values, std::span<double> product,
                          std::span<double> sums) const {
-  const double same = term.frame_value * (term.row ? term.row->values[y] : 1.0);
+  const double same = term.frame_value * (term.row ? term.row->values[at.y] : 1.0);
   if (same == 0.0 || std::isnan(same)) return;
   std::ranges::fill(product, same);
-  if (term.column) multiplyBy(term.column->values, product);
-  if (term.place)
-    for (std::size_t x = 0; x < width_; ++x) product[x] *= term.place->values[y * width_ + x];
-  for (const PixelFactor& factor : term.of_pixels) factor.basis.multiply(values.argumentOf(factor, y), product);
-  addKnown(product.data(), sums.data(), width_);
+  const auto multiplyStill = [&](const double* still) {
+    if (at.columns.empty())
+      for (std::size_t i = 0; i < product.size(); ++i) product[i] *= still[i];
+    else
+      for (std::size_t i = 0; i < product.size(); ++i) product[i] *= still[at.columns[i]];
+  };
+  if (term.column) multiplyStill(term.column->values.data());
+  if (term.place) multiplyStill(term.place->values.data() + at.y * width_);
+  for (const PixelFactor& factor : term.of_pixels) factor.basis.multiply(values.argumentOf(factor, at, width_), product);
+  addKnown(product.data(), sums.data(), sums.size());
+}
+
+void ImageTerms::addTerms(const Pixels& at, const PixelRow& pixels, std::span<double> sums) const {
+  RowValues values{pixels, sums.size(), per_pixel_.size()};
+  std::vector<double> product(sums.size());
+  for (const Compiled& term : terms_) addTerm(term, at, values, product, sums);
 }
 
 void ImageTerms::addRow(int y, const PixelRow& pixels, std::span<double> sums) const {
-  RowValues values{pixels, width_, per_pixel_.size()};
-  std::vector<double> product(width_);
-  for (const Compiled& term : terms_) addTerm(term, static_cast<std::size_t>(y), values, product, sums);
+  addTerms({static_cast<std::size_t>(y), {}}, pixels, sums);
+}
+
+void ImageTerms::addAt(std::span<const int> columns, int y, const PixelRow& pixels, std::span<double> sums) const {
+  if (!columns.empty()) addTerms({static_cast<std::size_t>(y), columns}, pixels, sums);
 }
 
 }  // namespace toftwin::terms

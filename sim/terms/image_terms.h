@@ -47,6 +47,8 @@ class ImageTerms {
   using PixelRow = std::function<void(std::size_t which, std::span<double> row)>;
   /// Adds the terms' sum to each of row y. Of different rows safe at the same time.
   void addRow(int y, const PixelRow& pixels, std::span<double> sums) const;
+  /// The same of some pixels of the row alone: `pixels` and `sums` have one number for each of these columns.
+  void addAt(std::span<const int> columns, int y, const PixelRow& pixels, std::span<double> sums) const;
 
   /// Whether nothing of it varies from pixel to pixel, so that addRow() asks for no covariate.
   [[nodiscard]] bool isStill() const { return per_pixel_.empty(); }
@@ -78,12 +80,21 @@ class ImageTerms {
     double frame_value = 0.0;  ///< coefficient × factors of the frame
   };
   class RowValues;
+  /// Pixels of a row: those columns, or all if there are none.
+  struct Pixels {
+    std::size_t y = 0;
+    std::span<const int> columns{};
+    [[nodiscard]] std::size_t column(std::size_t i) const {
+      return columns.empty() ? i : static_cast<std::size_t>(columns[i]);
+    }
+  };
 
   void compile(const Factor& factor, const FieldOf& fieldOf, Compiled& into);
   PixelFactor pixelFactor(const Factor& factor, const FieldOf& fieldOf);
   Layer layerOf(const Argument& argument, Varies varies, const FieldOf& fieldOf) const;
   std::size_t numberOf(const std::string& covariate);
-  void addTerm(const Compiled& term, std::size_t y, RowValues& values, std::span<double> product,
+  void addTerms(const Pixels& at, const PixelRow& pixels, std::span<double> sums) const;
+  void addTerm(const Compiled& term, const Pixels& at, RowValues& values, std::span<double> product,
                std::span<double> sums) const;
 
   std::size_t width_, height_;

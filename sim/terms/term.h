@@ -62,9 +62,9 @@ enum class Quantity : std::uint8_t {
   DelayMm,           ///< path of the light, as range, mm
   LightPercent,      ///< own light, % of itself or of the carrier
   OutwardPx,         ///< how far out of its place a pixel looks, pixels
-  InPhaseE,          ///< charge in phase with the reference, electrons; see Sample of LearnedColumns
-  QuadratureE,       ///< charge in quadrature, electrons
-  ChargePercent,     ///< all charges of the first tap, % of themselves
+  InPhaseE,          ///< charge of the first tap in phase with the reference, electrons: (2/N) cos(2π k/N) of it in raw exposure k of N
+  QuadratureE,       ///< the same in quadrature: (2/N) sin(2π k/N)
+  ChargePercent,     ///< all charges, % of themselves
 };
 
 enum class Stage : std::uint8_t { Light, Samples, Range };

@@ -408,7 +408,7 @@ int main(int argc, char** argv) {
     const std::string name{E::about.name};
     const bool is_asked = std::ranges::find(options.cases, name) != options.cases.end();
     if (!is_asked && !(options.cases.empty() && options.nulls.empty())) return;
-    if (isNoise(sim::AnyEffect{E{}}) || name.starts_with("learned_") || name == "delay") return;
+    if (isNoise(sim::AnyEffect{E{}}) || std::is_same_v<E, sim::Learned> || name == "delay") return;
     for (const double lambda : options.lambdas) {
       for (std::uint64_t seed = options.first_seed; seed <= options.last_seed; ++seed)
         hide(world, unspoilt, sim::AnyEffect{E::none()}, sim::AnyEffect{E{}}, options, lambda, seed);

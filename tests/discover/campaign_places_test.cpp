@@ -18,7 +18,7 @@ TEST_F(OfAnotherPlace, PixelsThatLookFartherInAreATableOverTheRadius) {
       << verdictOf(finding);
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_THAT(model->effectNames(), Contains("learned_shift"));
+  EXPECT_THAT(model->effectNames(), Contains("learned"));
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }
@@ -29,7 +29,7 @@ TEST_F(OfAnotherPlace, ASecondImageIsAKernelAboutTheMirroredPlace) {
   EXPECT_THAT(finding.effects.front().found.covariates, Contains("mirrored")) << verdictOf(finding);
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_THAT(model->effectNames(), Contains("learned_mirror"));
+  EXPECT_THAT(model->effectNames(), Contains("learned"));
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }
@@ -41,9 +41,10 @@ TEST_F(OfAnotherPlace, ASecondImageAboutAPointBesideThePrincipalOneIsOneEffect) 
   ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.covariates, Contains("mirrored")) << verdictOf(finding);
   ASSERT_TRUE(finding.effects.front().fitted);
-  const auto& mirror = std::get<sim::LearnedMirror>(finding.effects.front().fitted->effect);
-  EXPECT_NEAR(mirror.right, 1.0, 0.5);
-  EXPECT_NEAR(mirror.down, -1.0, 0.5);
+  const terms::Term* mirror = std::get<sim::Learned>(finding.effects.front().fitted->effect).terms.mirror();
+  ASSERT_NE(mirror, nullptr);
+  EXPECT_NEAR(mirror->carried[1], 1.0, 0.5);
+  EXPECT_NEAR(mirror->carried[2], -1.0, 0.5);
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.9) << verdictOf(finding);
 }
@@ -54,10 +55,11 @@ TEST_F(Searched, StripesThatRepeatAreOneEffectWithItsForm) {
   ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.covariates, testing::ElementsAre("column", "converter"));
   ASSERT_TRUE(finding.effects.front().fitted);
-  EXPECT_EQ(std::get<sim::LearnedColumns>(finding.effects.front().fitted->effect).in_phase_electrons.size(), 4U);
+  for (const terms::Term& term : std::get<sim::Learned>(finding.effects.front().fitted->effect).terms.list())
+    EXPECT_EQ(term.factors.front().numbers.front(), 4.0) << toText(term);
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_THAT(model->effectNames(), Contains("learned_columns"));
+  EXPECT_THAT(model->effectNames(), Contains("learned"));
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }

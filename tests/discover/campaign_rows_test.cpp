@@ -352,16 +352,20 @@ TEST_F(Rows, APatternGoesIntoTheModelAsStrongAsItWasFitted) {
   effect.parts.push_back({.group = {"pattern", Kind::Generic, {{{}, Stage::Range, "pixel:range"}}, 0}});
   const auto learned = learnedEffectsOf(effect, made.rows, *camera);
   ASSERT_EQ(learned.size(), 1U);
-  const auto& table = std::get<sim::LearnedRange>(learned.front().effect);
+  const auto& terms = std::get<sim::Learned>(learned.front().effect).terms.list();
   const PixelPattern& pattern = *made.rows.patternOf("pixel:range");
-  ASSERT_EQ(table.offsets_mm.size(), pattern.value.size());
   const auto size = [](const std::vector<double>& values) {
     double sum = 0.0;
     for (const double value : values) sum += std::abs(value);
     return sum;
   };
   EXPECT_GT(size(pattern.value), 100.0);
-  EXPECT_NEAR(size(table.offsets_mm), 0.5 * size(pattern.value), 1e-6);
+  // For each column of cells a hat times a curve over the rows: x₀, y₀, x₁, y₁ …
+  std::vector<double> offsets_mm;
+  for (const terms::Term& term : terms)
+    for (std::size_t i = 1; i < term.factors.back().numbers.size(); i += 2) offsets_mm.push_back(term.factors.back().numbers[i]);
+  ASSERT_EQ(offsets_mm.size(), pattern.value.size());
+  EXPECT_NEAR(size(offsets_mm), 0.5 * size(pattern.value), 1e-6);
 }
 
 /// Where the light's zero lies is fitted beforehand. That is no effect of the file, so that a phase of each
@@ -391,7 +395,7 @@ TEST_F(Rows, EveryEffectOfTheCatalogueThatShowsIsACandidateAndNoiseIsNot) {
   for (const char* shows : {"lens_scatter", "warm_up", "thermal_delay", "time_walk", "clock_scale",
                             "sample_offset", "vignetting", "propagation_delay", "calibration_table"})
     EXPECT_THAT(names, testing::Contains(shows));
-  for (const char* does_not : {"shot_noise", "read_noise", "range_noise", "delay", "learned_range"})
+  for (const char* does_not : {"shot_noise", "read_noise", "range_noise", "delay", "learned"})
     EXPECT_THAT(names, testing::Not(testing::Contains(does_not)));
 }
 

@@ -71,7 +71,7 @@ TEST_F(Searched, AnEffectOfNoCatalogueIsCalledUndeclaredAndNamedByWhatItGoesWith
   ASSERT_TRUE(finding.effects.front().fitted) << "not in the model";
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_THAT(model->effectNames(), Contains("learned_range"));
+  EXPECT_THAT(model->effectNames(), Contains("learned"));
 }
 
 /// A wave over the rows, in the range and in the brightness: two changes, but one place and one cause.
@@ -142,7 +142,7 @@ TEST_F(Searched, AnEffectThatTheCatalogueLacksIsNotBlamedOnAnother) {
   // What it does is in the model nevertheless.
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_THAT(model->effectNames(), Contains("learned_neighbours"));
+  EXPECT_THAT(model->effectNames(), Contains("learned"));
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }
@@ -150,14 +150,13 @@ TEST_F(Searched, AnEffectThatTheCatalogueLacksIsNotBlamedOnAnother) {
 /// Light that goes into a surface before it comes back is the later the flatter it meets it.
 TEST_F(Searched, ADelayThatGoesWithTheIncidenceIsATableOfTheLight) {
   simulate(
-      "[[effect]]\ntype = 'learned_light'\nover = 'incidence'\nknots = [1.0, 1.2, 1.5, 2.0]\n"
-      "delays_mm = [0.0, 4.0, 6.0, 7.0]\n");
+      "[[effect]]\ntype = 'learned'\nterms = ['delay_mm += 1 * curve(incidence, 1, 0, 1.2, 4, 1.5, 6, 2, 7)']\n");
   const CampaignFinding finding = search(job());
   ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.covariates, Contains("incidence")) << verdictOf(finding);
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_THAT(model->effectNames(), Contains("learned_light"));
+  EXPECT_THAT(model->effectNames(), Contains("learned"));
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }
@@ -171,21 +170,25 @@ TEST_F(Searched, APatternOfPixelsIsNamedByWhereItIs) {
   EXPECT_GT(finding.judgement->removed, 0.5);
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_THAT(model->effectNames(), Contains("learned_range"));
+  EXPECT_THAT(model->effectNames(), Contains("learned"));
 }
 
 /// Pixels of a row share wires. It is in the model: with no form nothing of it was removed.
 TEST_F(Searched, LightAlongRowsIsALineOfTheKernel) {
-  simulate("[[effect]]\ntype = 'learned_neighbours'\nreaches_px = []\nshares_percent = []\nrow_percent = 1.5\n");
+  simulate("[[effect]]\ntype = 'learned'\nterms = ['light_percent += 1.5 * row_mean()']\n");
   const CampaignFinding finding = search(job());
   ASSERT_THAT(namesOf(finding), ElementsAre("undeclared")) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("neighbours")) << verdictOf(finding);
   ASSERT_TRUE(finding.effects.front().fitted) << "the simulator has a form for it";
-  const auto* kernel = std::get_if<sim::LearnedNeighbours>(&finding.effects.front().fitted->effect);
+  const auto* kernel = std::get_if<sim::Learned>(&finding.effects.front().fitted->effect);
   ASSERT_NE(kernel, nullptr);
-  EXPECT_THAT(kernel->reaches_px, testing::IsEmpty());
-  for (const FittedNumber& number : finding.effects.front().fitted->numbers)
-    EXPECT_NEAR(number.value, number.key == "row_percent" ? 1.5 : 0.0, 4.0 * number.error) << number.key;
+  const std::vector<terms::Term>& lines = kernel->terms.list();
+  const auto& numbers = finding.effects.front().fitted->numbers;
+  ASSERT_EQ(numbers.size(), lines.size());
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    EXPECT_NE(lines[i].carrier, terms::Carrier::Square) << toText(lines[i]);
+    EXPECT_NEAR(numbers[i].value, lines[i].carrier == terms::Carrier::Row ? 1.5 : 0.0, 4.0 * numbers[i].error) << toText(lines[i]);
+  }
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }

@@ -76,7 +76,7 @@ TEST_F(Searched, RangesThatComeFromNeighboursAreTold) {
   EXPECT_THAT(verdictOf(finding), HasSubstr("ranges from neighbours"));
   const auto model = sim::SensorModel::parse(finding.model_toml, "model.toml");
   ASSERT_TRUE(model) << model.error().message;
-  EXPECT_THAT(model->effectNames(), testing::Contains("learned_smear"));
+  EXPECT_THAT(model->effectNames(), testing::Contains("learned"));
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }

@@ -42,7 +42,8 @@ TEST_F(OfOtherNumbers, StripesThatRepeatAfterSixColumnsAreLearnedAsThat) {
   const CampaignFinding finding = searchWithout("column_comb", "period = 6\noffset_electrons = 40\ngain = 0.004");
   ASSERT_EQ(finding.effects.size(), 1U) << verdictOf(finding);
   EXPECT_THAT(finding.effects.front().found.covariates, ElementsAre("column", "converter"));
-  EXPECT_EQ(std::get<sim::LearnedColumns>(finding.effects.front().fitted->effect).in_phase_electrons.size(), 6U);
+  for (const terms::Term& term : std::get<sim::Learned>(finding.effects.front().fitted->effect).terms.list())
+    EXPECT_EQ(term.factors.front().numbers.front(), 6.0) << toText(term);
   ASSERT_TRUE(finding.judgement);
   EXPECT_GT(finding.judgement->removed, 0.7) << verdictOf(finding);
 }

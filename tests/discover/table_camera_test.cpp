@@ -46,7 +46,7 @@ double addedBy(const std::string& toml, double range_m, double temperature_c) {
   moment.temperatures = {{"sensor", temperature_c * celsius}};
   double added_mm = 0.0;
   for (const sim::AnyEffect& effect : model->effects()) {
-    const auto* learned = std::get_if<sim::LearnedRange>(&effect);
+    const auto* learned = std::get_if<sim::Learned>(&effect);
     if (learned == nullptr) continue;
     const sim::RangeImage after = learned->apply(image, {moment, model->camera()}, sim::Random{1, 1, 1});
     added_mm += 1e3 * (static_cast<double>(after.range_m[0]) - range_m);

@@ -6,11 +6,15 @@
 #include <fstream>
 #include <sstream>
 
+#include <fmt/format.h>
+
 #include "drivers/sim/simulator.h"
 #include "protocol/settings/describe.h"
 #include "sim/effects/effects.h"
+#include "sim/effects/learned/covariates.h"
 #include "sim/sensor/camera_file.h"
 #include "sim/sensor/sensor_model.h"
+#include "sim/terms/words.h"
 
 namespace toftwin::sim {
 namespace {
@@ -39,12 +43,12 @@ TEST(Docs, EveryEffectHasAPageWithItsTruth) {
   AllEffects::forEach([&]<class E>() {
     const std::string name{E::about.name};
     const std::string page = textOf("docs/effects/" + name + ".md");
-    EXPECT_THAT(page, HasSubstr("`" + name + "`, on " + std::string{stageOf<E>()} +
+    EXPECT_THAT(page, HasSubstr("`" + name + "`, on " + std::string{stageInWords<E>()} +
                                 ". Depends on: " + covariatesOf(E::about) + "."));
     EXPECT_THAT(page, HasSubstr("\n" + settings::markdownTable(settings::keysOf<E>())));
     EXPECT_THAT(page, HasSubstr("](figures/" + name + ".svg)"));
     EXPECT_THAT(index,
-                HasSubstr("| [`" + name + "`](" + name + ".md) | " + std::string{stageOf<E>()} +
+                HasSubstr("| [`" + name + "`](" + name + ".md) | " + std::string{stageInWords<E>()} +
                           " | " + covariatesOf(E::about) + " |"));
   });
 }
@@ -57,6 +61,24 @@ TEST(Docs, NoEffectHasAPageWithoutBeing) {
     bool is_effect = page == "README";
     AllEffects::forEach([&]<class E>() { is_effect |= page == E::about.name; });
     EXPECT_TRUE(is_effect) << entry.path();
+  }
+}
+
+TEST(Docs, LearnedHasAllWordsOfItsLanguage) {
+  const std::string page = textOf("docs/effects/learned.md");
+  for (const terms::BasisWord& row : terms::kBasisWords)
+    EXPECT_THAT(page, HasSubstr(fmt::format("\n| `{}` | {} | {} |\n", row.word, row.numbered, row.formula)));
+  for (const terms::CarrierWord& row : terms::kCarrierWords)
+    EXPECT_THAT(page, HasSubstr(fmt::format("`{}({})`", row.word, row.numbered)));
+  for (const terms::QuantityWord& row : terms::kQuantityWords) {
+    if (row.quantity == terms::Quantity::Value) continue;
+    EXPECT_THAT(page, HasSubstr(fmt::format("`{}`", row.word)));
+  }
+  for (const LearnedCovariate& row : learnedCovariates()) {
+    const bool at_light = isKnownAt(terms::Stage::Light, row), at_range = isKnownAt(terms::Stage::Range, row);
+    const bool everywhere = isKnownAt(terms::Stage::Samples, row);
+    const std::string known = everywhere ? "all" : at_light && at_range ? "light, range" : at_light ? "light" : "range";
+    EXPECT_THAT(page, HasSubstr(fmt::format("\n| `{}` | {} | {} | {} |\n", row.name, row.unit, known, row.meaning)));
   }
 }
 

@@ -2,6 +2,7 @@
 // What every effect of the list must obey, whatever it does.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <set>
@@ -208,7 +209,7 @@ auto applied(const E& effect, ImageOf<E> image, const Scenario& scenario, Place 
   const auto collected = imageOf<Samples>(before);
   const auto range = imageOf<RangeImage>(before);
   return effect.apply(std::move(image),
-                      {moment, cameraAround(20, 11), place.left, place.top, {&collected, &range}},
+                      {moment, cameraAround(20, 11), place.left, place.top, {&collected, &range}, scenario.frame},
                       Random{kSeed, scenario.frame, effectKey(E::about.name, 0)});
 }
 
@@ -288,11 +289,74 @@ bool dependsOn(const E& effect, Covariate covariate) {
 template <class E>
 class EffectLaws : public testing::Test {};
 
+/// Learned terms of one stage as an effect that acts on that stage alone. It says what its terms go with.
+template <class Set>
+struct LearnedTermsOf {
+  Learned learned{.title = {}, .terms = LearnedTerms::parsed({Set::kTerms.begin(), Set::kTerms.end()})};
+  static constexpr About about{.name = Set::kName,
+                               .summary = Learned::about.summary,
+                               .reference = Learned::about.reference,
+                               .explains = Set::kExplains};
+  static LearnedTermsOf none() { return {Learned::none()}; }
+  template <class Visitor>
+  void visit(Visitor& v) {
+    learned.visit(v);
+  }
+  typename Set::Image apply(typename Set::Image image, const Conditions& now, const Random& random) const {
+    return learned.apply(std::move(image), now, random);
+  }
+};
+
+#define TOFTWIN_TERM_SET(set, image, name, explains, ...)          \
+  struct set {                                                     \
+    using Image = image;                                           \
+    static constexpr std::string_view kName = name;                \
+    static constexpr Covariates kExplains = explains;              \
+    static constexpr auto kTerms = std::to_array({__VA_ARGS__});   \
+  }
+using C = Covariate;
+TOFTWIN_TERM_SET(LearnedRanges, RangeImage, "learned", Covariates({C::Range}), "range_mm += 3 * bump(range_m, 2, 0.5)");
+TOFTWIN_TERM_SET(LearnedWave, RangeImage, "learned_wave", Covariates({C::Range, C::Time, C::Position, C::Ambient, C::Temperature}),
+                 "range_mm += 2 * sine(range_mm, 700) * decay(time_s, 400) * column",
+                 "range_mm += 0.1 * class(column + row, 2, 1) * ambient_klx",
+                 "range_mm += 0.2 * temperature_illumination_c * step(radius_px, 4)");
+TOFTWIN_TERM_SET(LearnedAmplitude, RangeImage, "learned_amplitude", Covariates({C::Amplitude, C::Exposure}),
+                 "amplitude_percent += 2 * log(amplitude_e)", "range_mm += 20 * power(amplitude_e, -0.25)");
+TOFTWIN_TERM_SET(LearnedNoise, RangeImage, "learned_noise", Covariates({C::Frame, C::Amplitude, C::Exposure}),
+                 "noise_mm += 2000 * power(amplitude_e, -0.5)");
+TOFTWIN_TERM_SET(LearnedInvalid, RangeImage, "learned_invalid", Covariates({C::Frame}), "invalid_percent += 80");
+TOFTWIN_TERM_SET(LearnedAround, RangeImage, "learned_around", Covariates({C::Range, C::Neighbours}),
+                 "range_mm += 0.1 * around()", "range_mm += 0.1 * across()", "range_mm += 0.1 * along()");
+TOFTWIN_TERM_SET(LearnedBefore, RangeImage, "learned_before", Covariates({C::Range, C::History}), "range_mm += 0.3 * before()");
+TOFTWIN_TERM_SET(LearnedFrame, RangeImage, "learned_frame", Covariates({C::Frame}), "range_mm += 26 * class(frame, 5, 4)",
+                 "range_mm += 3 * frame");
+TOFTWIN_TERM_SET(LearnedSurround, Light, "learned_surround", Covariates({C::Amplitude, C::Neighbours}),
+                 "delay_mm += 3 * surround_16px", "light_percent += 2 * surround_4px");
+TOFTWIN_TERM_SET(LearnedKernel, Light, "learned_kernel", Covariates({C::Amplitude, C::Range, C::Neighbours}),
+                 "light_percent += 0.5 * square(1)", "light_percent += 1 * square(15)", "light_percent += 0.3 * row_mean()",
+                 "light_percent += 0.2 * column_mean()");
+TOFTWIN_TERM_SET(LearnedMirror, Light, "learned_mirror", Covariates({C::Amplitude, C::Range, C::Position, C::Neighbours}),
+                 "light_percent += 0.5 * mirror(0, 2, 1)", "light_percent += 0.5 * mirror(5, 2, 1)");
+TOFTWIN_TERM_SET(LearnedLens, Light, "learned_lens", Covariates({C::Amplitude, C::Range, C::Position, C::Neighbours}),
+                 "outward_px += 1 * curve(radius_px, 0, 0, 100, 1)");
+TOFTWIN_TERM_SET(LearnedCharges, Samples, "learned_charges", Covariates({C::Exposure, C::Amplitude, C::Position}),
+                 "in_phase_e += 20 * class(column, 4, 2)", "quadrature_e += 15 * class(column + row, 4, 3)");
+TOFTWIN_TERM_SET(LearnedGains, Samples, "learned_gains", Covariates({C::Ambient, C::Amplitude, C::Range, C::Position}),
+                 "charge_percent += 0.2 * class(column, 4, 2)", "charge_percent += -0.1 * class(row, 3, 2)");
+#undef TOFTWIN_TERM_SET
+
 template <class List>
 struct AsTypes;
 template <class... Es>
 struct AsTypes<EffectList<Es...>> {
-  using type = testing::Types<Es..., Scale>;  // and the example of the documents
+  /// Each of one stage as it is, the learned ones as sets of terms of each stage, and the example of the documents.
+  template <class E>
+  using InLaws = std::conditional_t<std::is_same_v<E, Learned>, LearnedTermsOf<LearnedRanges>, E>;
+  using type = testing::Types<InLaws<Es>..., LearnedTermsOf<LearnedWave>, LearnedTermsOf<LearnedAmplitude>,
+                              LearnedTermsOf<LearnedNoise>, LearnedTermsOf<LearnedInvalid>, LearnedTermsOf<LearnedAround>,
+                              LearnedTermsOf<LearnedBefore>, LearnedTermsOf<LearnedFrame>, LearnedTermsOf<LearnedSurround>,
+                              LearnedTermsOf<LearnedKernel>, LearnedTermsOf<LearnedMirror>, LearnedTermsOf<LearnedLens>,
+                              LearnedTermsOf<LearnedCharges>, LearnedTermsOf<LearnedGains>, Scale>;
 };
 struct Names {
   template <class E>
@@ -394,6 +458,15 @@ TYPED_TEST(EffectLaws, DependsOnExactlyTheCovariatesItSays) {
   }
 }
 
+template <class Set>
+void expectItSaysSo(const LearnedTermsOf<Set>& effect) {
+  EXPECT_EQ(effect.learned.explains(), Set::kExplains);
+  EXPECT_EQ(effect.learned.problem(), "");
+}
+template <class E>
+void expectItSaysSo(const E&) {}
+TYPED_TEST(EffectLaws, ItsParametersSayTheSame) { expectItSaysSo(TypeParam{}); }
+
 /// A visitor that checks every number against its bounds.
 struct BoundsCheck {
   template <class D>
@@ -416,6 +489,8 @@ struct BoundsCheck {
   void choice(const char*, Enum&, std::initializer_list<std::pair<const char*, Enum>>, const char*) {
     ++count;
   }
+  void text(const char*, std::string&, const char*) { ++count; }
+  void texts(const char*, std::vector<std::string>&, const char*) { ++count; }
   int count = 0;
 };
 
@@ -464,7 +539,8 @@ TEST(EffectList, IsInTheOrderLightMeetsThemAndNamesEachOnce) {
   int last_stage = 0;
   AllEffects::forEach([&]<class E>() {
     EXPECT_TRUE(names.insert(E::about.name).second) << E::about.name;
-    const int stage = stageOf<E>() == "light" ? 0 : stageOf<E>() == "samples" ? 1 : 2;
+    if (ActsAtItsStage<E>) return;
+    const int stage = static_cast<int>(stageOf(E{}));
     EXPECT_GE(stage, last_stage) << E::about.name;
     last_stage = stage;
   });

@@ -4,7 +4,6 @@
 
 #include <cmath>
 
-#include "sim/effects/learned_table.h"
 #include "tests/sim/phase_rig.h"
 
 namespace toftwin::sim {
@@ -120,13 +119,19 @@ TEST(LensGhost, IsLinearBetweenPixels) {
   EXPECT_NEAR(seen.steady(31, 19), 0.02 * 5.0 * 0.2 * 0.1, 1e-6);
 }
 
+Learned learnedFrom(const std::vector<std::string>& texts) {
+  const Learned learned{.title = {}, .terms = LearnedTerms::parsed(texts)};
+  EXPECT_EQ(learned.problem(), "");
+  return learned;
+}
+
 // One bright pixel of phase φ among dark ones: a square of reach 2 has a 25th of it, or, where the image ends
 // after 3 × 3 of its pixels, a 9th.
-TEST(LearnedNeighbours, PutsItsShareOfASquaresMeanIntoEachPixel) {
+TEST(LearnedLight, PutsItsShareOfASquaresMeanIntoEachPixel) {
   const Light light = syntheticLight(11, 9, {20_MHz}, 2, [](int x, int y) {
     return std::vector<Way>{{(x == 5 && y == 4) || (x == 0 && y == 0) ? 5.0 : 0.0, 1.3}};
   });
-  const LearnedNeighbours square{.reaches_px = {2.0}, .shares_percent = {4.0}};
+  const Learned square = learnedFrom({"light_percent += 4 * square(2)"});
   const Light seen = applied(square, light, cameraOfSize(11, 9));
   EXPECT_NEAR(seen.steady(7, 6), 0.04 * 5.0 / 25.0, 1e-6);
   EXPECT_NEAR(seen.steady(8, 6), 0.0, 1e-9) << "3 columns away";
@@ -135,14 +140,14 @@ TEST(LearnedNeighbours, PutsItsShareOfASquaresMeanIntoEachPixel) {
   EXPECT_NEAR(phaseOf(seen.phasor(0, 2)(7, 6)), std::remainder(2.0 * phaseAt(1.3, 20e6), 2.0 * kPi), 1e-6);
 }
 
-TEST(LearnedNeighbours, AddsUpItsSquaresOfTheLightAsItCame) {
+TEST(LearnedLight, AddsUpItsSquaresOfTheLightAsItCame) {
   const Light light = syntheticLight(30, 20, {20_MHz}, 1, [](int x, int) {
     return std::vector<Way>{x < 10 ? Way{3.0, 0.7} : Way{1.0, 2.1}};
   });
   const CameraInfo camera = cameraOfSize(30, 20);
-  const Light both = applied(LearnedNeighbours{{1.0, 100.0}, {-2.0, 3.0}}, light, camera),
-              near = applied(LearnedNeighbours{{1.0}, {-2.0}}, light, camera),
-              far = applied(LearnedNeighbours{{100.0}, {3.0}}, light, camera);
+  const Light both = applied(learnedFrom({"light_percent += -2 * square(1)", "light_percent += 3 * square(100)"}), light, camera),
+              near = applied(learnedFrom({"light_percent += -2 * square(1)"}), light, camera),
+              far = applied(learnedFrom({"light_percent += 3 * square(100)"}), light, camera);
   EXPECT_NEAR(far.steady(17, 3), 1.0 + 0.03 * (10.0 * 3.0 + 20.0) / 30.0, 1e-6) << "the mean of all";
   for (int x = 0; x < 30; ++x) {
     const auto sum = near.phasor(0, 1)(x, 7) + far.phasor(0, 1)(x, 7) - light.phasor(0, 1)(x, 7);
@@ -151,10 +156,10 @@ TEST(LearnedNeighbours, AddsUpItsSquaresOfTheLightAsItCame) {
 }
 
 // Of a row of 11 pixels and a column of 9 with one bright one.
-TEST(LearnedNeighbours, PutsItsShareOfARowsAndAColumnsMeanIntoEachPixel) {
+TEST(LearnedLight, PutsItsShareOfARowsAndAColumnsMeanIntoEachPixel) {
   const Light light = syntheticLight(
       11, 9, {20_MHz}, 2, [](int x, int y) { return std::vector<Way>{{x == 5 && y == 4 ? 5.0 : 0.0, 1.3}}; });
-  const LearnedNeighbours lines{.reaches_px = {}, .shares_percent = {}, .row_percent = 4.0, .column_percent = -2.0};
+  const Learned lines = learnedFrom({"light_percent += 4 * row_mean()", "light_percent += -2 * column_mean()"});
   const Light seen = applied(lines, light, cameraOfSize(11, 9));
   EXPECT_NEAR(seen.steady(0, 4), 0.04 * 5.0 / 11.0, 1e-6);
   EXPECT_NEAR(seen.steady(5, 8), -0.02 * 5.0 / 9.0, 1e-6);
@@ -162,21 +167,15 @@ TEST(LearnedNeighbours, PutsItsShareOfARowsAndAColumnsMeanIntoEachPixel) {
   EXPECT_NEAR(seen.steady(4, 3), 0.0, 1e-9) << "in neither";
 }
 
-TEST(LearnedNeighbours, SaysWhatIsWrongWithItsKernel) {
-  EXPECT_THAT(
-      errorOf(plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'learned_neighbours'\nreaches_px = [1, 2, 3]\n")),
-      testing::HasSubstr("has 2 shares_percent for 3 reaches_px: one for each"));
-}
-
 // As the ghost does, but for the light that is missing at its source; and between pixels.
-TEST(LearnedMirror, PutsItsShareOfTheMirroredPlaceIntoEachPixel) {
+TEST(LearnedLight, PutsItsShareOfTheMirroredPlaceIntoEachPixel) {
   CameraInfo camera = cameraOfSize(41, 31);
   camera.cx = 20.0, camera.cy = 15.0;
   const Light light = syntheticLight(41, 31, {20_MHz}, 2, [](int x, int y) {
     return std::vector<Way>{{x == 12 && y == 10 ? 5.0 : 0.0, 1.3}};
   });
   const auto mirrored = [&](double reach, double right) {
-    return applied(LearnedMirror{.reaches_px = {reach}, .shares_percent = {2.0}, .right = right, .down = 0.0},
+    return applied(learnedFrom({"light_percent += 2 * mirror(" + std::to_string(reach) + ", " + std::to_string(right) + ", 0)"}),
                    light, camera);
   };
   const Light sharp = mirrored(0.0, 1.0);
@@ -192,7 +191,7 @@ TEST(LearnedMirror, PutsItsShareOfTheMirroredPlaceIntoEachPixel) {
 }
 
 // s = (1/(1 + ε) − 1) r is a focal length that is longer by ε.
-TEST(LearnedShift, IsALongerFocalLengthWhereItIsAShareOfTheRadius) {
+TEST(LearnedLight, IsALongerFocalLengthWhereItIsAShareOfTheRadius) {
   constexpr double kLonger = 0.01;
   CameraInfo camera = cameraOfSize(60, 40);
   camera.fx = camera.fy = 50.0, camera.cx = 29.5, camera.cy = 19.5;
@@ -201,8 +200,7 @@ TEST(LearnedShift, IsALongerFocalLengthWhereItIsAShareOfTheRadius) {
         {1.0 + 0.3 * std::sin(0.4 * x) + 0.1 * y, 1.0 + 0.02 * x + 0.2 * std::cos(0.3 * y)}};
   });
   const Light longer = applied(DistortionMisfit{.focal_error = kLonger}, light, camera);
-  const LearnedShift shift{.radii_px = {0.0, 100.0},
-                           .outward_px = {0.0, 100.0 * (1.0 / (1.0 + kLonger) - 1.0)}};
+  const Learned shift = learnedFrom({"outward_px += " + std::to_string(1.0 / (1.0 + kLonger) - 1.0) + " * radius_px"});
   const Light shifted = applied(shift, light, camera);
   for (const auto& [x, y] : {std::pair{0, 0}, {59, 39}, {3, 20}, {41, 7}}) {
     EXPECT_NEAR(shifted.steady(x, y), longer.steady(x, y), 1e-5) << x << ' ' << y;
@@ -211,26 +209,13 @@ TEST(LearnedShift, IsALongerFocalLengthWhereItIsAShareOfTheRadius) {
   }
 }
 
-TEST(LearnedShift, SaysWhatIsWrongWithItsTable) {
-  const auto wrongWith = [](const std::string& keys) {
-    return errorOf(plainCamera(4, 2, 0.5, "[[effect]]\ntype = 'learned_shift'\n" + keys + "\n"));
-  };
-  EXPECT_THAT(wrongWith("radii_px = [1, 2, 3]"),
-              testing::HasSubstr("has 2 outward_px for 3 radii_px: one for each"));
-  EXPECT_THAT(wrongWith("radii_px = [2, 1]"), testing::HasSubstr("must have radii_px that ascend"));
-}
-
 // A surface turned by 60° about the vertical: 1/cos is 2 on the axis.
 TEST(LearnedLight, IsLaterAndDimmerAsItsTableSaysOfTheIncidence) {
   Light light = syntheticLight(3, 1, {20_MHz}, 2, [](int, int) { return std::vector<Way>{{0.8, 1.5}}; });
   const double turn = kPi / 3.0;
   for (Vec3f& normal : light.truth.normal.pixels())
     normal = {static_cast<float>(std::sin(turn)), 0.0F, static_cast<float>(-std::cos(turn))};
-  const LearnedLight learned{.over = LearnedLight::Over::Incidence,
-                             .knots = {1.0, 3.0},
-                             .delays_mm = {0.0, 20.0},
-                             .gains_percent = {0.0, -8.0}};
-  EXPECT_EQ(learned.problem(), "");
+  const Learned learned = learnedFrom({"delay_mm += 1 * curve(incidence, 1, 0, 3, 20)", "light_percent += -4 * hinge(incidence, 1)"});
   CameraInfo camera = cameraOfSize(3, 1);
   camera.fx = camera.fy = 1.0, camera.cx = 1.0, camera.cy = 0.0;
   const Light seen = applied(learned, light, camera);
@@ -249,7 +234,7 @@ TEST(LearnedLight, IsLaterAndDimmerAsItsTableSaysOfTheIncidence) {
 TEST(LearnedLight, IsLaterAsItsTableSaysOfTheScenesAlbedo) {
   Light light = syntheticLight(2, 1, {20_MHz}, 1, [](int, int) { return std::vector<Way>{{0.8, 1.5}}; });
   light.truth.albedo(0, 0) = 0.5F, light.truth.albedo(1, 0) = 0.9F;
-  const LearnedLight learned{.over = LearnedLight::Over::Albedo, .knots = {0.1, 0.9}, .delays_mm = {40.0, 0.0}};
+  const Learned learned = learnedFrom({"delay_mm += 40 * curve(albedo, 0.1, 1, 0.9, 0)"});
   const Light seen = applied(learned, light, cameraOfSize(2, 1));
   EXPECT_NEAR(phaseOf(seen.phasor(0, 1)(0, 0)), phaseAt(1.52, 20e6), 1e-5);
   EXPECT_NEAR(phaseOf(seen.phasor(0, 1)(1, 0)), phaseAt(1.5, 20e6), 1e-5);
@@ -262,29 +247,12 @@ TEST(LearnedLight, ComparesAPixelWithItsSurroundings) {
   const Light light = syntheticLight(40, 30, {20_MHz}, 1, [](int x, int y) {
     return std::vector<Way>{{x == 20 && y == 15 ? 4.0 : 1.0, 1.0}};
   });
-  const LearnedLight learned{.over = LearnedLight::Over::Surround4,
-                             .knots = {-10.0, 10.0},
-                             .delays_mm = {},
-                             .gains_percent = {-100.0, 100.0}};
+  const Learned learned = learnedFrom({"light_percent += 10 * surround_4px"});
   const Light seen = applied(learned, light, cameraOfSize(40, 30));
   const double mean = 84.0 / 81.0;
   EXPECT_NEAR(seen.steady(20, 15), 4.0 * (1.0 + 0.1 * std::log(mean / 4.0)), 1e-5);
   EXPECT_NEAR(seen.steady(17, 12), 1.0 + 0.1 * std::log(mean), 1e-5);
   EXPECT_NEAR(seen.steady(5, 5), 1.0, 1e-6);
-}
-
-// A camera that demodulates keeps of the light what it correlates; the scene goes with it for whom needs it.
-TEST(LearnedLight, KnowsTheSceneInAWholeCamera) {
-  const std::string effect =
-      "[[effect]]\ntype = 'learned_light'\nover = 'incidence'\nknots = [1, 20]\ndelays_mm = [0, 19]\n";
-  Light light = syntheticLight(40, 25, {80_MHz}, 1, [](int, int) { return std::vector<Way>{{1.0, 1.0}}; });
-  for (Vec3f& normal : light.truth.normal.pixels()) normal = {0.6F, 0.0F, -0.8F};
-  const auto rangeWith = [&](const std::string& effects) {
-    const SensorModel model = modelOf(plainCamera(4, 2, 0.5, effects));
-    return static_cast<double>(model.expose(light, {}, 1, 0).range.range_m(20, 12));
-  };
-  const double incidence = incidenceAt(modelOf(plainCamera(4, 2, 0.5)).camera(), {0.6F, 0.0F, -0.8F}, 20, 12);
-  EXPECT_NEAR(rangeWith(effect) - rangeWith(""), 1e-3 * (incidence - 1.0), 1e-6);
 }
 
 std::string reflection(double radiance, double half_way_mm) {

@@ -178,14 +178,16 @@ std::complex<double> correlationOf(const Samples& samples, int x) {
 }
 
 /// Charges of 2000 electrons are known to 2e-4 as float; eight of them are added up.
-TEST(LearnedColumns, AddsItsChargesToTheCorrelationOfEveryMthColumn) {
+TEST(LearnedCharges, AddsItsChargesToTheCorrelationOfEveryMthColumn) {
   for (const int steps : {3, 4}) {
     Samples samples;
     samples.frequencies = {20_MHz}, samples.steps = steps, samples.taps = 2;
     for (int i = 0; i < 2 * steps; ++i)
       samples.electrons.emplace_back(6, 1, i % 2 == 0 ? 2000.0F + 10.0F * static_cast<float>(i) : 500.0F);
-    const LearnedColumns columns{
-        .in_phase_electrons = {30.0, -7.0}, .quadrature_electrons = {0.0, 12.0}, .gains_percent = {0.0, 1.0}};
+    const Learned columns{.title = {}, .terms = LearnedTerms::parsed({"in_phase_e += 30 * class(column, 2, 0)",
+                                                                      "in_phase_e += -7 * class(column, 2, 1)",
+                                                                      "quadrature_e += 12 * class(column, 2, 1)",
+                                                                      "charge_percent += 1 * class(column, 2, 1)"})};
     const CameraInfo camera{};
     const Samples seen = columns.apply(samples, {Moment{}, camera}, Random{1, 1, 1});
     for (int x = 0; x < 6; ++x) {
@@ -197,12 +199,6 @@ TEST(LearnedColumns, AddsItsChargesToTheCorrelationOfEveryMthColumn) {
     const Samples cut = columns.apply(samples, {Moment{}, camera, 1, 0}, Random{1, 1, 1});
     EXPECT_EQ(cut.tap(0, 1, 0)(0, 0), seen.tap(0, 1, 0)(1, 0));
   }
-}
-
-TEST(LearnedColumns, ListsAreAsLongAsEachOther) {
-  EXPECT_EQ(LearnedColumns{}.problem(), "");
-  EXPECT_EQ((LearnedColumns{.quadrature_electrons = {}, .gains_percent = {}}.problem()), "");
-  EXPECT_NE((LearnedColumns{.gains_percent = {1.0, 2.0}}.problem()), "");
 }
 
 TEST(AmbientSuppression, SparesTheWellAndCostsContrastInProportionToWhatItTakes) {

@@ -147,9 +147,11 @@ Result<Exit> describeCamera(const Options& options) {
                          .set("model_id", model->id())
                          .set("camera", toJson(model->camera()))
                          .set("effects", Json::arrayOf(effects))
+                         .set("notes", Json::arrayOf(model->notes()))
                          .text());
     return Exit::Ok;
   }
+  for (const std::string& note : model->notes()) fmt::print(stderr, "toftwin: note: {}\n", note);
   fmt::print("{}: camera of the simulator\nmodel        {}\nmodel id     {}\n{}effects      {}\n",
              options.what, model->model(), model->id(), toText(model->camera()),
              effects.empty() ? "none" : fmt::format("{}", fmt::join(effects, ", ")));

@@ -173,6 +173,7 @@ Result<Job> jobOf(const RenderOptions& options) {
   if (!scene) return scene.error();
   if (const auto missing = sim::missingLight(*scene, model->traceRequest().emitters, false))
     fmt::print(stderr, "toftwin: {}: warning: {}\n", options.scene, *missing);
+  for (const std::string& note : model->notes()) fmt::print(stderr, "toftwin: note: {}\n", note);
   if (const auto off_axis = sim::lensOffAxis(model->camera()))
     fmt::print(stderr, "toftwin: {}: warning: {}\n", options.camera, *off_axis);
   const auto pose = options.pose.pose();

@@ -50,6 +50,7 @@ class Numbers {
   void choice(const char*, Enum&, std::initializer_list<std::pair<const char*, Enum>>, const char*) {}
   void flag(const char*, bool&, const char*) {}
   void text(const char*, std::string&, const char*) {}
+  static constexpr bool kSeesNumbersOfTerms = true;
 
  private:
   static double low(Bounds bounds) { return bounds.min; }
@@ -167,8 +168,7 @@ double stepWithin(const EffectNumber& number) {
 }
 
 bool isNoise(const sim::AnyEffect& effect) {
-  return std::visit([]<class E>(const E&) { return E::about.explains.contains(sim::Covariate::Frame); },
-                    effect);
+  return sim::explainsOf(effect).contains(sim::Covariate::Frame);
 }
 
 /// An effect's numbers by what they are for.
@@ -306,20 +306,26 @@ std::string nameOf(const sim::AnyEffect& effect) {
 }
 
 Stage stageOf(const sim::AnyEffect& effect) {
-  const auto word = std::visit([]<class E>(const E&) { return sim::stageOf<E>(); }, effect);
-  return word == "light" ? Stage::Light : word == "samples" ? Stage::Samples : Stage::Range;
+  const terms::Stage stage = sim::stageOf(effect);
+  return stage == terms::Stage::Light ? Stage::Light : stage == terms::Stage::Samples ? Stage::Samples : Stage::Range;
 }
 
 std::vector<std::string> covariatesOf(const sim::AnyEffect& effect) {
   std::vector<std::string> words;
-  const sim::Covariates on = std::visit([]<class E>(const E&) { return E::about.explains; }, effect);
+  const sim::Covariates on = sim::explainsOf(effect);
   for (const auto& [covariate, word] : sim::kCovariateNames) {
     if (on.contains(covariate)) words.emplace_back(word);
   }
   return words;
 }
 
-std::size_t placeOf(const sim::AnyEffect& effect) { return effect.index(); }
+std::size_t placeOf(const sim::AnyEffect& effect) {
+  const auto behind = [](const sim::AnyEffect& other) { return 2 * other.index() + 1; };
+  if (!std::holds_alternative<sim::Learned>(effect)) return 2 * effect.index();
+  // What has no name yet comes behind the optics, the converter, the decoding: before what filters.
+  if (sim::actsOn<sim::Light>(effect)) return behind(sim::InternalReflection{});
+  return sim::actsOn<sim::Samples>(effect) ? behind(sim::ColumnComb{}) : behind(sim::CalibrationTable{});
+}
 
 std::vector<sim::AnyEffect> withInserted(std::vector<sim::AnyEffect> effects, const sim::AnyEffect& effect) {
   const auto behind = std::ranges::find_if(
@@ -353,7 +359,7 @@ std::vector<Candidate> candidatesOf(const Sensitivity& probe, const std::vector<
     const bool is_left_out = std::ranges::find(left_out, E::about.name) != left_out.end() ||
                              (is_declared && !choosesAPlace(defaults));
     // What was learned from data without a name is no explanation of other data.
-    if (is_left_out || isNoise(defaults) || E::about.name.starts_with("learned_")) return;
+    if (is_left_out || isNoise(defaults) || std::is_same_v<E, sim::Learned>) return;
     Candidate candidate = candidateOf(sim::AnyEffect{E::none()}, defaults, declared, probe);
     if (!candidate.variations.empty()) all.push_back(std::move(candidate));
   });

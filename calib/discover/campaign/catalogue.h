@@ -32,7 +32,7 @@ bool isStrength(const sim::AnyEffect& effect, const std::string& key);
 std::string nameOf(const sim::AnyEffect& effect);
 Stage stageOf(const sim::AnyEffect& effect);
 std::vector<std::string> covariatesOf(const sim::AnyEffect& effect);
-/// Its place in sim::AllEffects: where light meets it.
+/// Where light meets it: in the order of sim::AllEffects, what was learned at the end of its stage's imperfections.
 std::size_t placeOf(const sim::AnyEffect& effect);
 
 /// The list with one effect more, where light meets it, behind others of its kind.

@@ -8,7 +8,7 @@
 #include <toftwin/nan.h>
 
 #include "calib/discover/campaign/carriers.h"
-#include "sim/effects/learned_table.h"
+#include "sim/effects/learned/covariates.h"
 
 namespace toftwin::discover {
 namespace {
@@ -74,12 +74,9 @@ void addPlaces(const CameraInfo& camera, const sim::Truth& truth, CovariateGathe
 /// How much brighter than itself a pixel's surroundings are, at three scales: what scatters in the
 /// lens.
 void addSurroundings(const Image<float>& amplitude, CovariateGatherer& gatherer) {
-  using sim::LearnedOver;
-  for (const auto& [name, over] : {std::pair{"surround_4px", LearnedOver::Surround4},
-                                   std::pair{"surround_16px", LearnedOver::Surround16},
-                                   std::pair{"surround_all", LearnedOver::SurroundAll}})
-    gatherer.add(name,
-                 sim::surroundings(amplitude, sim::reachOf(over, amplitude.width(), amplitude.height())));
+  for (const auto& [name, reach] : {std::pair{"surround_4px", 4}, std::pair{"surround_16px", 16},
+                                    std::pair{"surround_all", std::max(amplitude.width(), amplitude.height())}})
+    gatherer.add(name, sim::surroundings(amplitude, reach));
 }
 
 struct KnownCovariate {

@@ -53,7 +53,7 @@ std::vector<sim::AnyEffect> moved(std::vector<sim::AnyEffect> effects, const Fre
 }
 
 bool actsOnLight(const std::vector<sim::AnyEffect>& effects) {
-  return std::ranges::any_of(effects, [](const auto& effect) { return stageOf(effect) == Stage::Light; });
+  return std::ranges::any_of(effects, [](const auto& effect) { return discover::stageOf(effect) == Stage::Light; });
 }
 
 /// A twentieth of what the effect has, or of a tenth of what its defaults have; where those have nothing, at least a ten

@@ -7,7 +7,6 @@
 #include <numbers>
 #include <numeric>
 #include <set>
-#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -16,18 +15,30 @@
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/repeating_columns.h"
 #include "calib/discover/campaign/smeared_ranges.h"
+#include "sim/effects/learned/covariates.h"
+#include "sim/effects/learned/tables.h"
 
 namespace toftwin::discover {
 namespace {
 
-using Over = sim::LearnedOver;
+using terms::Quantity;
 
-std::optional<Over> overOf(const std::string& covariate) {
-  for (const auto& [word, over] : sim::kLearnedWords) {
-    if (word == covariate && over != Over::Nothing) return over;
+sim::AnyEffect learnedFrom(std::vector<terms::Term> all) { return sim::Learned{.title = {}, .terms = std::move(all)}; }
+
+/// Offsets and gains over one or two covariates, either of which may be none.
+struct LearnedTable {
+  sim::KnotTable table{};
+  std::vector<double> offsets_mm{}, gains_percent{};
+
+  [[nodiscard]] sim::AnyEffect as(Quantity of_offsets, Quantity of_gains) const {
+    std::vector<terms::Term> all = sim::termsOf(table, offsets_mm, of_offsets);
+    for (terms::Term& term : sim::termsOf(table, gains_percent, of_gains)) all.push_back(std::move(term));
+    return learnedFrom(std::move(all));
   }
-  return std::nullopt;
-}
+  [[nodiscard]] sim::AnyEffect inRange() const { return as(Quantity::RangeMm, Quantity::AmplitudePercent); }
+};
+
+bool isSimulators(const std::string& covariate) { return sim::learnedCovariate(covariate) != nullptr; }
 
 /// Where the table has knots: the covariate's levels, or evenly over it and where its values lie.
 std::vector<double> tableKnotsOf(const CovariateInfo& covariate, std::size_t even) {
@@ -86,19 +97,19 @@ std::vector<Along> alongOf(const Effect& effect) {
 }
 
 /// Whether a decoded image no longer tells it, but the light does.
-bool onlyLightKnows(Over over) { return over >= Over::Incidence; }
+bool onlyLightKnows(const std::string& covariate) {
+  return !sim::isKnownAt(terms::Stage::Range, *sim::learnedCovariate(covariate));
+}
 
 /// The same in the light, where a delay is nearly an error of the range. Nothing for what light does not
 /// know: electrons, and what delays a pulse.
-std::optional<sim::AnyEffect> inLight(sim::LearnedRange table, bool has_phasors) {
-  const bool needs_electrons = table.over == Over::Amplitude || table.and_over == Over::Amplitude;
-  if (needs_electrons || (!has_phasors && !table.offsets_mm.empty())) return std::nullopt;
-  return sim::LearnedLight{.over = table.over,
-                           .knots = std::move(table.knots),
-                           .and_over = table.and_over,
-                           .and_knots = std::move(table.and_knots),
-                           .delays_mm = std::move(table.offsets_mm),
-                           .gains_percent = std::move(table.gains_percent)};
+std::optional<sim::AnyEffect> inLight(const LearnedTable& learned, bool has_phasors) {
+  const auto isKnown = [](const std::string& covariate) {
+    return covariate.empty() || sim::isKnownAt(terms::Stage::Light, *sim::learnedCovariate(covariate));
+  };
+  if (!isKnown(learned.table.over) || !isKnown(learned.table.and_over)) return std::nullopt;
+  if (!has_phasors && !learned.offsets_mm.empty()) return std::nullopt;
+  return learned.as(Quantity::DelayMm, Quantity::LightPercent);
 }
 
 /// A table over one or two covariates: of the decoded image where that tells them, else of the light.
@@ -108,19 +119,15 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
   const bool dims = std::ranges::any_of(along.terms, [](const auto& one) { return changesGain(one.first); });
   if (along.covariates.empty() || along.covariates.size() > 2 || !(moves || dims)) return std::nullopt;
   std::array<const CovariateInfo*, 2> info{};
-  std::array<Over, 2> over{};
   for (std::size_t i = 0; i < along.covariates.size(); ++i) {
     info[i] = infoNamed(covariates, along.covariates[i]);
-    const auto known = overOf(along.covariates[i]);
-    if (info[i] == nullptr || !known) return std::nullopt;
-    over[i] = *known;
+    if (info[i] == nullptr || !isSimulators(along.covariates[i])) return std::nullopt;
   }
   const bool has_two = along.covariates.size() == 2;
-  sim::LearnedRange learned{
-      .over = over[0], .knots = tableKnotsOf(*info[0], has_two ? 24 : 256), .offsets_mm = {}};
-  if (has_two) learned.and_over = over[1], learned.and_knots = tableKnotsOf(*info[1], 24);
-  for (const double x : learned.knots) {
-    for (const double y : has_two ? learned.and_knots : std::vector{0.0}) {
+  LearnedTable learned{.table = {.over = along.covariates[0], .knots = tableKnotsOf(*info[0], has_two ? 24 : 256)}};
+  if (has_two) learned.table.and_over = along.covariates[1], learned.table.and_knots = tableKnotsOf(*info[1], 24);
+  for (const double x : learned.table.knots) {
+    for (const double y : has_two ? learned.table.and_knots : std::vector{0.0}) {
       const auto at = [&](const std::string& name) { return name == along.covariates[0] ? x : y; };
       const auto within = [](double value, double least, double most) {
         return std::isfinite(value) ? std::clamp(value, least, most) : 0.0;
@@ -133,44 +140,43 @@ std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const Covari
   const bool is_delay = std::ranges::all_of(along.terms, [](const auto& one) {
     return !movesRange(one.first) || one.first.carrier == kDelayCarrier;
   });
-  const bool needs_light = std::ranges::any_of(over, onlyLightKnows);
+  const bool needs_light = std::ranges::any_of(along.covariates, onlyLightKnows);
   if (needs_light || (moves && is_delay)) {
     auto light = inLight(learned, has_phasors);
     if (light || needs_light) return light;
   }
-  return learned;
+  return learned.inRange();
 }
 
 /// How fast a temperature changes no frame says, but when it was: as a table over the time of these captures.
 std::optional<sim::AnyEffect> tableOverTime(const Along& along, const CampaignRows& rows) {
   if (along.covariates.size() != 1 || !along.covariates.front().starts_with(kRatePrefix)) return std::nullopt;
-  sim::LearnedRange learned{.over = Over::Time, .knots = {}, .offsets_mm = {}};
+  LearnedTable learned{.table = {.over = "time_s"}};
   std::vector<double> gains;
   for (const auto& [time, rate] : rows.overTime(along.covariates.front())) {
     const auto at = [r = rate](const std::string&) { return r; };
-    learned.knots.push_back(time);
+    learned.table.knots.push_back(time);
     learned.offsets_mm.push_back(std::clamp(along.sum(movesRange, at), -1e4, 1e4));
     gains.push_back(std::clamp(along.sum(changesGain, at), -100.0, 1e4));
   }
   if (std::ranges::any_of(gains, [](double one) { return one != 0.0; })) learned.gains_percent = std::move(gains);
-  return learned;
+  return learned.inRange();
 }
 
 /// A pattern of pixels, as a table over columns and rows with a knot in the middle of each cell. `strength`:
 /// the pattern's coefficient beside everything else that was found.
 sim::AnyEffect tableOf(const PixelPattern& pattern, double strength) {
-  sim::LearnedRange learned{
-      .over = Over::Column, .knots = {}, .and_over = Over::Row, .and_knots = {}, .offsets_mm = {}};
+  LearnedTable learned{.table = {.over = "column", .and_over = "row"}};
   const CellGrid& grid = pattern.grid;
   for (int i = 0; i < grid.columns; ++i)
-    learned.knots.push_back(i * grid.cell_width + 0.5 * (grid.cell_width - 1));
+    learned.table.knots.push_back(i * grid.cell_width + 0.5 * (grid.cell_width - 1));
   for (int i = 0; i < grid.rows; ++i)
-    learned.and_knots.push_back(i * grid.cell_height + 0.5 * (grid.cell_height - 1));
+    learned.table.and_knots.push_back(i * grid.cell_height + 0.5 * (grid.cell_height - 1));
   std::vector<double>& table = pattern.carrier == kGainCarrier ? learned.gains_percent : learned.offsets_mm;
   for (int column = 0; column < grid.columns; ++column)
     for (int row = 0; row < grid.rows; ++row)
       table.push_back(strength * pattern.value[static_cast<std::size_t>(row * grid.columns + column)]);
-  return learned;
+  return learned.inRange();
 }
 
 /// Coefficients of a carrier's two parts, where all of its terms are constant.
@@ -212,42 +218,57 @@ sim::AnyEffect reflectionOf(const sim::SensorModel& model, double in_phase, doub
   return reflection;
 }
 
-/// Light from neighbours or from the mirrored place, as a kernel of squares: a carrier is 1 % of the square's
-/// mean. Its shares are fitted through the simulator, which has all frequencies and knows what comes after
-/// the light.
-template <class Kernel>
-std::optional<LearnedEffect> kernelOf(const Along& along, const CameraInfo& camera,
-                                      std::optional<int> (*reach_of)(std::string_view)) {
-  Kernel kernel{.reaches_px = {}, .shares_percent = {}};
-  std::vector<std::string> free;
+/// Squares that light comes from: a carrier is 1 % of a square's mean.
+struct Kernel {
+  std::vector<double> reaches_px{}, percent{};
+};
+
+Kernel kernelOf(const Along& along, const CameraInfo& camera, std::optional<int> (*reach_of)(std::string_view)) {
+  Kernel kernel;
   for (const auto& [term, coefficient] : along.terms) {
     const auto reach = reach_of(term.carrier);
     if (!reach || !term.factors.empty()) continue;
-    free.push_back(fmt::format("shares_percent[{}]", free.size()));
     kernel.reaches_px.push_back(std::min(*reach, std::max(camera.width, camera.height)));
-    kernel.shares_percent.push_back(std::clamp(coefficient, -100.0, 100.0));
+    kernel.percent.push_back(std::clamp(coefficient, -100.0, 100.0));
   }
-  if constexpr (std::is_same_v<Kernel, sim::LearnedNeighbours>) {
-    for (const auto& [term, coefficient] : along.terms) {
-      if (!term.factors.empty() || (term.carrier != kAlongRow && term.carrier != kAlongColumn)) continue;
-      const bool is_row = term.carrier == kAlongRow;
-      (is_row ? kernel.row_percent : kernel.column_percent) = std::clamp(coefficient, -100.0, 100.0);
-      free.push_back(is_row ? "row_percent" : "column_percent");
-    }
+  return kernel;
+}
+
+/// Shares are fitted through the simulator, which has all frequencies and knows what comes after the light.
+std::optional<LearnedEffect> fittedThrough(std::vector<terms::Term> all, const std::vector<std::string>& more = {}) {
+  if (all.empty()) return std::nullopt;
+  std::vector<std::string> free;
+  for (std::size_t i = 0; i < all.size(); ++i) free.push_back(fmt::format("coefficients[{}]", i));
+  free.insert(free.end(), more.begin(), more.end());
+  return LearnedEffect{learnedFrom(std::move(all)), std::move(free)};
+}
+
+/// Light from neighbours.
+std::optional<LearnedEffect> neighboursOf(const Along& along, const CameraInfo& camera) {
+  const Kernel kernel = kernelOf(along, camera, reachOfNeighbours);
+  std::vector<terms::Term> all = sim::termsOfSquares(kernel.reaches_px, kernel.percent);
+  for (const auto& [term, coefficient] : along.terms) {
+    if (!term.factors.empty() || (term.carrier != kAlongRow && term.carrier != kAlongColumn)) continue;
+    all.push_back({.quantity = Quantity::LightPercent,
+                   .coefficient = std::clamp(coefficient, -100.0, 100.0),
+                   .carrier = term.carrier == kAlongRow ? terms::Carrier::Row : terms::Carrier::Column});
   }
-  if (free.empty()) return std::nullopt;
-  if constexpr (std::is_same_v<Kernel, sim::LearnedMirror>) {
-    constexpr double kMost = 2.0;  // farther off, the first order says nothing
-    const double light = std::accumulate(kernel.shares_percent.begin(), kernel.shares_percent.end(), 0.0);
-    kernel.right = kernel.down = 0.0;  // where the carrier was mirrored
-    for (const auto& [term, coefficient] : along.terms) {
-      const auto by = mirrorMovedBy(term.carrier);
-      if (!by || !term.factors.empty() || !(std::abs(coefficient) < kMost * std::abs(light))) continue;
-      kernel.right += coefficient / light * (*by)[0], kernel.down += coefficient / light * (*by)[1];
-    }
-    free.insert(free.end(), {"right_px", "down_px"});
+  return fittedThrough(std::move(all));
+}
+
+/// Light from the mirrored place.
+std::optional<LearnedEffect> mirrorOf(const Along& along, const CameraInfo& camera) {
+  const Kernel kernel = kernelOf(along, camera, reachOfMirrored);
+  constexpr double kMost = 2.0;  // farther off, the first order says nothing
+  const double light = std::accumulate(kernel.percent.begin(), kernel.percent.end(), 0.0);
+  double right = 0.0, down = 0.0;  // where the carrier was mirrored
+  for (const auto& [term, coefficient] : along.terms) {
+    const auto by = mirrorMovedBy(term.carrier);
+    if (!by || !term.factors.empty() || !(std::abs(coefficient) < kMost * std::abs(light))) continue;
+    right += coefficient / light * (*by)[0], down += coefficient / light * (*by)[1];
   }
-  return LearnedEffect{std::move(kernel), std::move(free)};
+  return fittedThrough(sim::termsOfMirroredSquares(kernel.reaches_px, kernel.percent, right, down),
+                       {"mirror_right_px", "mirror_down_px"});
 }
 
 /// How much farther out pixels look, as a table over the radius.
@@ -259,13 +280,14 @@ std::optional<sim::AnyEffect> shiftOf(const Along& along, std::span<const Covari
   if (std::ranges::none_of(along.terms,
                            [&](const auto& one) { return goes_out(one.first) || goes_in(one.first); }))
     return std::nullopt;
-  sim::LearnedShift shift{.radii_px = tableKnotsOf(*radius, 64), .outward_px = {}};
-  for (const double r : shift.radii_px) {
+  const sim::KnotTable table{.over = "radius_px", .knots = tableKnotsOf(*radius, 64)};
+  std::vector<double> outward_px;
+  for (const double r : table.knots) {
     const auto at = [r](const std::string&) { return r; };
     const double outward = along.sum(goes_out, at) - along.sum(goes_in, at);
-    shift.outward_px.push_back(std::isfinite(outward) ? std::clamp(outward, -1000.0, 1000.0) : 0.0);
+    outward_px.push_back(std::isfinite(outward) ? std::clamp(outward, -1000.0, 1000.0) : 0.0);
   }
-  return shift;
+  return learnedFrom(sim::termsOf(table, outward_px, Quantity::OutwardPx));
 }
 
 /// The tables of all covariates that its terms go with. One part of a sum says nothing without the others: all or none.
@@ -294,10 +316,8 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
   for (const Along& along : all)
     if (const auto shift = shiftOf(along, covariates)) learned.push_back({*shift});
   for (const Along& along : all) {
-    if (const auto kernel = kernelOf<sim::LearnedNeighbours>(along, model.camera(), reachOfNeighbours))
-      learned.push_back(*kernel);
-    if (const auto kernel = kernelOf<sim::LearnedMirror>(along, model.camera(), reachOfMirrored))
-      learned.push_back(*kernel);
+    if (auto neighbours = neighboursOf(along, model.camera())) learned.push_back(*std::move(neighbours));
+    if (auto mirror = mirrorOf(along, model.camera())) learned.push_back(*std::move(mirror));
   }
   // Together: what one adds to all pixels and another takes off bright ones would be two filters, one after the other.
   std::vector<std::pair<Term, double>> terms;

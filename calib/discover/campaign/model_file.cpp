@@ -2,6 +2,7 @@
 #include "calib/discover/campaign/model_file.h"
 
 #include <algorithm>
+#include <limits>
 #include <sstream>
 
 #include <fmt/format.h>
@@ -43,7 +44,8 @@ std::string tomlOf(const FittedEffect& fitted, const std::string& why) {
   const auto keys =
       std::visit([]<class E>(const E& effect) { return settings::keysOf(effect); }, fitted.effect);
   for (const settings::Key& key : keys) {
-    text += fmt::format("{} = {}{}\n", key.name, key.value, errorOf(fitted, key.name));
+    // What is fitted of terms are their coefficients.
+    text += fmt::format("{} = {}{}\n", key.name, key.value, errorOf(fitted, key.name == "terms" ? "coefficients" : key.name));
   }
   return text;
 }
@@ -78,7 +80,7 @@ std::string withEffects(std::string_view camera_file, const std::vector<sim::Any
     if (!is_replaced) text += line + "\n";
   }
   text += "\n";
-  writeBefore(std::variant_size_v<sim::AnyEffect>);
+  writeBefore(std::numeric_limits<std::size_t>::max());
   return text;
 }
 

@@ -224,7 +224,7 @@ std::shared_ptr<const RowSource> CampaignRows::including(std::span<const NamedFi
       if (has_delay_) rows.base.putDelay(fixed.cells, reading, staged.by(*late, Stage::Light));
       for (std::size_t i = 0; i < free.size(); ++i)
         rows.base.putChange(fixed.cells, declared_columns + i, reading,
-                            staged.by(cameras[i], stageOf(all->effects_[free[i].place])));
+                            staged.by(cameras[i], discover::stageOf(all->effects_[free[i].place])));
       rows.evidence = with_catalogue ? ownEvidence(rows) : rows.base.evidence(fixed.name, fixed.block);
     }
   });

@@ -89,7 +89,7 @@ struct BlockSum {
 void rename(Effect& effect, const Alternative& to) {
   effect.name = to.name, effect.covariates = to.covariates, effect.is_catalogue = true;
   effect.fit = to.named, effect.numbers = to.named->numbers;
-  effect.stage = stageOf(campaignFitOf(*to.named).effect);
+  effect.stage = discover::stageOf(campaignFitOf(*to.named).effect);
   effect.parts.clear(), effect.coefficient.clear();
   effect.gain.mean -= to.worse.mean;
 }

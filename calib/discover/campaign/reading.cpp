@@ -55,7 +55,7 @@ std::vector<sim::AnyEffect> effectsWithoutNoise(const sim::SensorModel& model) {
   std::vector<sim::AnyEffect> effects = model.effects();
   std::erase_if(effects, [](const sim::AnyEffect& any) {
     return std::visit(
-        []<class E>(const E&) { return E::about.explains.contains(sim::Covariate::Frame); }, any);
+        []<class E>(const E& effect) { return sim::explainsOf(effect).contains(sim::Covariate::Frame); }, any);
   });
   return effects;
 }

@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 
 #include "calib/discover/campaign/carriers.h"
+#include "sim/effects/learned/tables.h"
 
 namespace toftwin::discover {
 namespace {
@@ -53,24 +54,23 @@ std::vector<TermGroup> repeatingColumns(std::span<const CovariateInfo> covariate
 std::optional<LearnedEffect> columnsOf(std::span<const std::pair<Term, double>> terms) {
   if (std::ranges::none_of(terms, [](const auto& one) { return isOfConverter(one.first); })) return std::nullopt;
   const std::size_t period = periodOf(terms);
-  sim::LearnedColumns columns{.in_phase_electrons = std::vector<double>(period),
-                              .quadrature_electrons = std::vector<double>(period),
-                              .gains_percent = std::vector<double>(period)};
-  std::vector<std::string> free;
-  for (const auto& [part, list] : {std::pair{"in_phase", &columns.in_phase_electrons},
-                                   {"quadrature", &columns.quadrature_electrons},
-                                   {"gain", &columns.gains_percent}}) {
-    const bool is_gain = list == &columns.gains_percent;
-    const std::string key = is_gain ? "gains_percent" : fmt::format("{}_electrons", part);
+  std::vector<terms::Term> columns;
+  for (const auto& [part, quantity] : {std::pair{"in_phase", terms::Quantity::InPhaseE},
+                                       {"quadrature", terms::Quantity::QuadratureE},
+                                       {"gain", terms::Quantity::ChargePercent}}) {
+    const bool is_gain = quantity == terms::Quantity::ChargePercent;
+    std::vector<double> values(period);
     for (std::size_t j = 0; j < period; ++j) {
       for (const auto& [term, coefficient] : terms)
         if (term.carrier == partOf(part))
-          (*list)[j] += coefficient * term.at([j](const std::string&) { return static_cast<double>(j); });
-      (*list)[j] = std::clamp((*list)[j], is_gain ? -100.0 : -1e9, is_gain ? 1e4 : 1e9);
-      if (!is_gain || j > 0) free.push_back(fmt::format("{}[{}]", key, j));
+          values[j] += coefficient * term.at([j](const std::string&) { return static_cast<double>(j); });
+      values[j] = std::clamp(values[j], is_gain ? -100.0 : -1e9, is_gain ? 1e4 : 1e9);
     }
+    for (terms::Term& term : sim::termsOfColumns(values, quantity)) columns.push_back(std::move(term));
   }
-  return LearnedEffect{std::move(columns), std::move(free)};
+  std::vector<std::string> free;
+  for (std::size_t i = 0; i < columns.size(); ++i) free.push_back(fmt::format("coefficients[{}]", i));
+  return LearnedEffect{sim::Learned{.title = {}, .terms = std::move(columns)}, std::move(free)};
 }
 
 }  // namespace toftwin::discover

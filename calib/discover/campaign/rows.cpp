@@ -56,7 +56,7 @@ class Probe {
     if (!camera) return {};
     std::vector<float> changes;
     for (const StagedReading* base : bases_) {
-      const Reading there = base->by(*camera, stageOf(variation.on));
+      const Reading there = base->by(*camera, discover::stageOf(variation.on));
       const std::size_t count = there.range_m.size(), stride = 1 + count / kPixels;
       for (std::size_t i = 0; i < count; i += stride) {
         const float range = 1e3F * (there.range_m[i] - base->reading().range_m[i]);
@@ -121,7 +121,7 @@ struct Varied {
 };
 
 Group groupOf(const Candidate& candidate, Kind kind) {
-  Group group{.name = nameOf(candidate.example), .kind = kind, .stage = stageOf(candidate.example)};
+  Group group{.name = nameOf(candidate.example), .kind = kind, .stage = discover::stageOf(candidate.example)};
   group.covariates = covariatesOf(candidate.example);
   group.count = candidate.variations.size(), group.numbers = static_cast<int>(group.count);
   return group;
@@ -139,7 +139,7 @@ Result<VariedEffect> variedOf(const Declared& declared, const std::vector<sim::A
                                           : withInserted(effects, variation.on),
                               captures);
     if (!camera) return camera.error();
-    varied.variants.push_back({*std::move(camera), stageOf(variation.on)});
+    varied.variants.push_back({*std::move(camera), discover::stageOf(variation.on)});
   }
   return varied;
 }

@@ -285,7 +285,7 @@ Result<Evidence> CampaignRows::evidenceLeft(const Left& left) const {
       if (has_delay_) whitened.putDelay(fixed.cells, reading, staged.by(*late, Stage::Light));
       for (std::size_t i = 0; i < cameras.size(); ++i)
         whitened.putChange(fixed.cells, first_free + i, reading,
-                           staged.by(cameras[i], stageOf(left.effects[left.free[i].place])));
+                           staged.by(cameras[i], discover::stageOf(left.effects[left.free[i].place])));
       const auto numbers = static_cast<Eigen::Index>(left.free.size());
       for (std::size_t k = 0; k < kChannels; ++k) {
         if (whitened.columns[k].size() == 0) continue;

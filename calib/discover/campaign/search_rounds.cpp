@@ -173,7 +173,8 @@ Result<> fitFound(const Declared& file, const CampaignRows* file_rows, const Ope
   putForms(round, inserted, round.effects);
   // About which point a learned mirror turns the image is known to a pixel or two, and may be farther off.
   const bool has_mirror = std::ranges::any_of(inserted.fitted, [&](std::size_t place) {
-    return std::holds_alternative<sim::LearnedMirror>(inserted.effects[place]);
+    const auto* learned = std::get_if<sim::Learned>(&inserted.effects[place]);
+    return learned != nullptr && learned->terms.mirror() != nullptr;
   });
   const std::vector<TermGroup> beside = formless(round.effects);
   auto refitted = refit(*round.rows, inserted.effects, inserted.fitted,

@@ -7,6 +7,8 @@
 #include <fmt/format.h>
 
 #include "calib/discover/candidates.h"
+#include "sim/effects/learned/ranges_around.h"
+#include "sim/effects/learned/tables.h"
 
 namespace toftwin::discover {
 namespace {
@@ -14,11 +16,11 @@ namespace {
 struct Way {
   const char* name;
   float sim::Smears::*part;
-  std::vector<double> sim::LearnedSmear::*shares;
+  terms::Carrier carrier;
 };
-constexpr std::array kWays{Way{"across", &sim::Smears::across, &sim::LearnedSmear::across_percent},
-                           Way{"along", &sim::Smears::along, &sim::LearnedSmear::along_percent},
-                           Way{"around", &sim::Smears::around, &sim::LearnedSmear::around_percent}};
+constexpr std::array kWays{Way{"across", &sim::Smears::across, terms::Carrier::Across},
+                           Way{"along", &sim::Smears::along, terms::Carrier::Along},
+                           Way{"around", &sim::Smears::around, terms::Carrier::Around}};
 constexpr std::size_t kSmearKnots = 6;  ///< over the amplitude: a filter's threshold is sharp
 constexpr float kSmearedShare = 0.01F;
 
@@ -30,7 +32,7 @@ std::map<std::string, Reading> smearedCarriers(const Reading& declared) {
   std::map<std::string, Reading> all;
   const Image<float>& range_m = declared.range_m;
   const Image<float> none(range_m.width(), range_m.height());
-  for (const auto& [way, part, shares] : kWays) {
+  for (const auto& [way, part, carrier] : kWays) {
     Reading& change = all[smearedOf(way)] = {none, none};
     for (int y = 0; y < range_m.height(); ++y)
       for (int x = 0; x < range_m.width(); ++x)
@@ -65,18 +67,19 @@ std::optional<LearnedEffect> smearOf(std::span<const std::pair<Term, double>> te
   if (std::ranges::none_of(terms, isSmear)) return std::nullopt;
   for (const auto& one : terms)
     if (isSmear(one) && !std::ranges::all_of(one.first.factors, isByAmplitude)) return std::nullopt;
-  sim::LearnedSmear smear{
-      .amplitudes_e = amplitudes, .across_percent = {}, .along_percent = {}, .around_percent = {}};
+  std::vector<terms::Term> smear;
   for (const Way& way : kWays) {
+    std::vector<double> percent;
     for (const double amplitude : amplitudes) {
       double share = 0.0;
       for (const auto& [term, coefficient] : terms)
         if (term.carrier == smearedOf(way.name))
           share += coefficient * term.at([amplitude](const std::string&) { return amplitude; });
-      (smear.*way.shares).push_back(std::clamp(share, -100.0, 100.0));
+      percent.push_back(std::clamp(share, -100.0, 100.0));
     }
+    for (terms::Term& term : sim::termsOfSmear(amplitudes, percent, way.carrier)) smear.push_back(std::move(term));
   }
-  return LearnedEffect{std::move(smear), {}};
+  return LearnedEffect{sim::Learned{.title = {}, .terms = std::move(smear)}, {}};
 }
 
 }  // namespace toftwin::discover

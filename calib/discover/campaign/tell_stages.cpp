@@ -71,7 +71,7 @@ void takeNameBack(bool is_before, Effect& effect) {
   effect.stage = is_before ? Stage::Light : Stage::Range;
   if (is_before) effect.stages_alike.push_back(Stage::Samples);
   std::erase_if(effect.alternatives, [&](const Alternative& other) {
-    return other.named && isElsewhere(stageOf(campaignFitOf(*other.named).effect), is_before);
+    return other.named && isElsewhere(discover::stageOf(campaignFitOf(*other.named).effect), is_before);
   });
 }
 
@@ -94,7 +94,7 @@ void addStagesOfOthers(std::optional<bool> is_before, bool contradict, Effect& e
   for (const Alternative& other : effect.alternatives) {
     std::vector<Stage> stages;
     if (other.named)
-      stages.push_back(stageOf(campaignFitOf(*other.named).effect));
+      stages.push_back(discover::stageOf(campaignFitOf(*other.named).effect));
     else if (!other.group.terms.empty() && !contradict)
       stages = stagesOf(other.group.terms.front().stage.value_or(Stage::Range), is_before,
                         isOfPixels(other.covariates));

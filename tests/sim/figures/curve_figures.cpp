@@ -265,7 +265,6 @@ void addCurveFigures(std::map<std::string, Draw>& figures) {
                  {curve("10 mm, the same at every range", ranges(), measure(effect("delay"), greyWall).mean)},
                  std::pair{-1.0, 12.0});
   };
-  figures["learned_range"] = [] { return errorOverRange("a table", {{"three knots", effect("learned_range")}}); };
   figures["calibration_table"] = [] { return errorOverRange("a table", {{"seven knots", effect("calibration_table")}}); };
   figures["saturation"] = saturation;
   figures["shot_noise"] = [] { return noiseOverRange("shot noise", {{"shot noise of a grey wall", effect("shot_noise")}}); };

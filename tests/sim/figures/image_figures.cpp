@@ -176,62 +176,16 @@ void addImageFigures(std::map<std::string, Draw>& figures) {
                              .panels = {{"ghost of 0.5 %", errorOf(effect("lens_ghost"), light)},
                                         {"of 2 %", errorOf(effect("lens_ghost", "share = 0.02"), light)}}});
   };
-  figures["learned_neighbours"] = [] {
+  figures["learned"] = [] {
     const Light light = boxBeforeWall();
-    return standalone(Panels{
-        .label = "error of the range, mm",
-        .low = -80.0,
-        .high = 80.0,
-        .diverging = true,
-        .panels = {
-            {"two squares", errorOf(effect("learned_neighbours"), light)},
-            {"the wider alone",
-             errorOf(effect("learned_neighbours", "reaches_px = [15]\nshares_percent = [1]"), light)},
-            {"along rows alone",
-             errorOf(effect("learned_neighbours", "reaches_px = []\nshares_percent = []\nrow_percent = 1"), light)}}});
-  };
-  figures["learned_mirror"] = [] {
-    const Light light = boxBeforeWall(0.25);
-    return standalone(Panels{
-        .label = "error of the range, mm",
-        .low = -80.0,
-        .high = 80.0,
-        .diverging = true,
-        .panels = {
-            {"sharp", errorOf(effect("learned_mirror", "reaches_px = [0]\nshares_percent = [1]"), light)},
-            {"within 5 px",
-             errorOf(effect("learned_mirror", "reaches_px = [5]\nshares_percent = [1]"), light)}}});
-  };
-  figures["learned_shift"] = [] {
-    const Light light = boxBeforeWall();
-    return standalone(Panels{
-        .label = "error of the range, mm",
-        .low = -20.0,
-        .high = 20.0,
-        .diverging = true,
-        .panels = {{"farther out by 1 % of the radius", errorOf(effect("learned_shift"), light)},
-                   {"farther in by 1 %", errorOf(effect("learned_shift", "outward_px = [0, -1]"), light)}}});
-  };
-  figures["learned_smear"] = [] {
-    const Light light = boxBeforeWall();
-    const std::string all = "amplitudes_e = [0]\nalong_percent = [0]\n";
-    return standalone(Panels{
-        .label = "error of the range, mm",
-        .low = -80.0,
-        .high = 80.0,
-        .diverging = true,
-        .panels = {{"a tenth across", errorOf(effect("learned_smear", all + "across_percent = [10]\naround_percent = [0]"), light)},
-                   {"a tenth around", errorOf(effect("learned_smear", all + "across_percent = [0]\naround_percent = [10]"), light)}}});
-  };
-  figures["learned_light"] = [] {
-    const Light light = boxBeforeWall();
-    return standalone(Panels{
-        .label = "error of the range, mm",
-        .low = -6.0,
-        .high = 6.0,
-        .diverging = true,
-        .panels = {{"surroundings of 16 px", errorOf(effect("learned_light"), light)},
-                   {"of the image", errorOf(effect("learned_light", "over = 'surround_all'"), light)}}});
+    const auto of = [&](const std::string& term) { return errorOf(effect("learned", "terms = ['" + term + "']"), light); };
+    return standalone(Panels{.label = "error of the range, mm",
+                             .low = -40.0,
+                             .high = 40.0,
+                             .diverging = true,
+                             .panels = {{"range: wave × column", of("range_mm += 0.6 * sine(range_mm, 700) * column")},
+                                        {"light: 1 % of its row", of("light_percent += 1 * row_mean()")},
+                                        {"samples: 8th columns", of("quadrature_e += 60 * class(column, 8, 3)")}}});
   };
   figures["vignetting"] = [] {
     return standalone(Panels{.label = "amplitude, ke-",
@@ -266,15 +220,6 @@ void addImageFigures(std::map<std::string, Draw>& figures) {
                              .diverging = true,
                              .panels = {{"a grey wall", errorOf(comb, wall(0.01))},
                                         {"four times darker", errorOf(comb, wall(0.0025))}}});
-  };
-  figures["learned_columns"] = [] {
-    const std::string columns = effect("learned_columns");
-    return standalone(Panels{.label = "error of the range, mm",
-                             .low = -20.0,
-                             .high = 20.0,
-                             .diverging = true,
-                             .panels = {{"a grey wall", errorOf(columns, wall(0.01))},
-                                        {"four times darker", errorOf(columns, wall(0.0025))}}});
   };
   figures["lag"] = lag;
   figures["flying_pixel_filter"] = [] { return pointsWithFilter(effect("flying_pixel_filter")); };

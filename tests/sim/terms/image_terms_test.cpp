@@ -73,6 +73,12 @@ TEST(ImageTerms, OfRandomTermsAreTheSumOfTheTermsInEachPixel) {
       image.addRow(y, [&](std::size_t which, std::span<double> row) {
         for (int x = 0; x < kWidth; ++x) row[static_cast<std::size_t>(x)] = knownAt(image.perPixel()[which], x, y).number;
       }, sums);
+      const std::vector<int> columns{1, 4, 5, 12};
+      std::vector<double> some(columns.size(), 0.0);
+      image.addAt(columns, y, [&](std::size_t which, std::span<double> row) {
+        for (std::size_t k = 0; k < row.size(); ++k) row[k] = knownAt(image.perPixel()[which], columns[k], y).number;
+      }, some);
+      for (std::size_t k = 0; k < columns.size(); ++k) ASSERT_EQ(some[k], sums[static_cast<std::size_t>(columns[k])]);
       for (int x = 0; x < kWidth; ++x) {
         const double expected = sumOf(terms, [&](std::string_view name) { return knownAt(name, x, y); });
         ASSERT_NEAR(sums[static_cast<std::size_t>(x)], expected, 1e-14 * magnitudeAt(terms, x, y))
