@@ -11,6 +11,7 @@
 #include <set>
 #include <utility>
 
+#include "daemon/correction.h"
 #include "daemon/networks.h"
 #include "daemon/thrown.h"
 #include "protocol/settings/describe.h"
@@ -112,6 +113,24 @@ std::optional<RecordPlan> readRecord(settings::Table& table, const RecordKeys& k
   return std::nullopt;
 }
 
+std::shared_ptr<const LearnedCorrection> correctionOf(const SourceKeys& keys, settings::Table& table) {
+  if (keys.correction.empty()) return nullptr;
+  auto read = readCorrection(table.resolve(keys.correction));
+  if (read) return *std::move(read);
+  table.complain("correction", fmt::format("= \"{}\": {}", keys.correction, read.error().message));
+  return nullptr;
+}
+
+/// The opened source corrected. That it has no range is a mistake of the configuration.
+Result<std::unique_ptr<drivers::Source>> openedCorrected(std::shared_ptr<const LearnedCorrection> correction,
+                                                         Result<std::unique_ptr<drivers::Source>> opened,
+                                                         settings::Table& table) {
+  if (!correction || !opened || *opened == nullptr) return opened;
+  if (const std::string problem = problemWith(*correction, (*opened)->info().planes); !problem.empty())
+    table.complain("correction", "cannot be had: " + problem);
+  return corrected(std::move(correction), std::move(opened));
+}
+
 ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driver> drivers,
                             const std::vector<std::string>& running, std::set<std::string>& names,
                             const std::filesystem::path& recording_folder) {
@@ -124,14 +143,16 @@ ConfiguredSource readSource(settings::Table table, std::span<const drivers::Driv
   std::string fingerprint =
       table.resolve("").string() + "\n" + table.canonicalText() + "\n" + stampsOf(table, log);
   const bool is_as_before = std::ranges::find(running, fingerprint) != running.end();
-  ConfiguredSource source{std::move(keys), driver, table, nullptr, std::move(fingerprint), is_as_before};
+  ConfiguredSource source{std::move(keys), driver, table, nullptr, nullptr, std::move(fingerprint), is_as_before};
   source.record = std::move(record);
   if (driver == nullptr || settings::EndableReading::now().stop_requested()) return source;
   if (is_as_before) {
     table.acceptAll();
   } else {
     source.faults = std::make_shared<FaultPlan>(source.keys.faults, source.keys.name, log);
-    source.opened = FaultPlan::open(source.faults, openGuarded(*driver, source.table));
+    source.correction = correctionOf(source.keys, source.table);
+    source.opened = FaultPlan::open(
+        source.faults, openedCorrected(source.correction, openGuarded(*driver, source.table), source.table));
   }
   return source;
 }

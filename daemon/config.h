@@ -22,6 +22,8 @@
 
 namespace toftwin::daemon {
 
+struct LearnedCorrection;  // correction.h
+
 /// [listen]
 struct ListenKeys {
   std::string address = "127.0.0.1";
@@ -169,6 +171,7 @@ struct SourceKeys {
   std::string name;
   std::string driver;
   Start start = Start::OnDemand;
+  std::string correction;
   std::vector<FaultKeys> faults;
   std::string fault_log;
   RecordKeys record;
@@ -180,6 +183,9 @@ struct SourceKeys {
     v.text("driver", driver, "one of the drivers below");
     v.choice("start", start, {{"on_demand", Start::OnDemand}, {"always", Start::Always}},
              "makes frames only while somebody wants them, or from the daemon's start to its end");
+    v.text("correction", correction,
+           "a file of learned effects, relative to this one, whose errors are taken off range and depth, as `toftwin discover` "
+           "writes it; empty: none");
     v.group("fault", faults, "what goes wrong on purpose");
     v.text("fault_log", fault_log,
            "a file, relative to this one, that is written anew: a line of CSV for every fault that struck");
@@ -192,6 +198,7 @@ struct ConfiguredSource {
   SourceKeys keys;
   const drivers::Driver* driver = nullptr;
   settings::Table table;
+  std::shared_ptr<const LearnedCorrection> correction;  ///< null: none, or as before
   std::shared_ptr<FaultPlan> faults;  ///< shared by all openings of the source; null: as before
   std::string fingerprint;  ///< equal for sources that need not be opened anew on a reload
   bool is_as_before = false;

@@ -14,6 +14,7 @@
 
 #include <toftwin/client.h>
 
+#include "daemon/correction.h"
 #include "daemon/notify.h"
 #include "daemon/start_signals.h"
 #include "daemon/thrown.h"
@@ -230,12 +231,12 @@ void Daemon::Loop::applyKeys(const Config& config) {
 void Daemon::Loop::run(ConfiguredSource source) {
   running_.push_back({source.keys.name, source.fingerprint});
   const auto open = [driver = source.driver, table = source.table,
-                     faults = source.faults]() -> Result<std::unique_ptr<drivers::Source>> {
+                     faults = source.faults, correction = source.correction]() -> Result<std::unique_ptr<drivers::Source>> {
     if (auto may = faults->mayOpen(); !may) return may.error();
     settings::Table again = table.anew();
     SourceKeys known;  // ticked off, so that what the driver leaves over is unknown to both
     again.read(known);
-    return FaultPlan::open(faults, driver->open(again));
+    return FaultPlan::open(faults, corrected(correction, driver->open(again)));
   };
   const SourceHost::Options options{.always = source.keys.start == SourceKeys::Start::Always};
   logging::info("source {}: driver {}", source.keys.name, source.driver->name);

@@ -111,8 +111,11 @@ Result<Exit> describeRecording(const Options& options) {
       const Frame& frame = first->second;
       text += fmt::format("kind         {}\nplanes       {}\n{}", nameOf(frame.provenance.kind),
                           planesOf(frame), toText(frame.camera));
+      if (!frame.provenance.effects.empty())
+        text += fmt::format("effects      {}\n", fmt::join(frame.provenance.effects, ", "));
       about.set("kind", std::string{nameOf(frame.provenance.kind)})
-          .set("camera", toJson(frame.camera));
+          .set("camera", toJson(frame.camera))
+          .set("effects", Json::arrayOf(frame.provenance.effects));
     }
     sources.set(source, about);
   }
