@@ -49,7 +49,10 @@ inline double powerAt(double x, double n) {
   if (n == 2.0) return x * x;
   return std::isnan(x) ? x : std::pow(x, n);
 }
-inline double sawtoothAt(double x, double period) { return x / period - std::floor(x / period) - 0.5; }
+inline double sawtoothAt(double x, double period, double a) {
+  const double turns = (x - a) / period;
+  return turns - std::floor(turns) - 0.5;
+}
 inline double stepAt(double x, double a) { return std::isnan(x) ? x : (x >= a ? 1.0 : 0.0); }
 inline double sigmoidAt(double x, double a, double w) { return 1.0 / (1.0 + std::exp(-(x - a) / w)); }
 inline double hingeAt(double x, double a) { return std::isnan(x) ? x : std::max(0.0, x - a); }
@@ -101,7 +104,7 @@ double unchecked(Basis basis, double x, const std::vector<double>& n) {
     case Basis::Cosine:
       return cosineOfTurns(x / n[0]);
     case Basis::Sawtooth:
-      return sawtoothAt(x, n[0]);
+      return sawtoothAt(x, n[0], n[1]);
     case Basis::Step:
       return stepAt(x, n[0]);
     case Basis::Sigmoid:
@@ -136,7 +139,7 @@ TOFTWIN_SIMD void multiplyLoops(Basis basis, const double* n, const double* x, d
       for (std::size_t i = 0; i < count; ++i) product[i] *= finiteOrNan(cosineOfTurns(x[i] / n[0]));
       return;
     case Basis::Sawtooth:
-      for (std::size_t i = 0; i < count; ++i) product[i] *= finiteOrNan(sawtoothAt(x[i], n[0]));
+      for (std::size_t i = 0; i < count; ++i) product[i] *= finiteOrNan(sawtoothAt(x[i], n[0], n[1]));
       return;
     case Basis::Step:
       for (std::size_t i = 0; i < count; ++i) product[i] *= finiteOrNan(stepAt(x[i], n[0]));

@@ -19,7 +19,7 @@ enum class Basis : std::uint8_t {
   Decay,     ///< exp(−x/τ); τ
   Sine,      ///< sin(2π x/Λ); period Λ
   Cosine,    ///< cos(2π x/Λ); period Λ
-  Sawtooth,  ///< x/Λ − floor(x/Λ) − ½; period Λ
+  Sawtooth,  ///< (x − a)/Λ − floor((x − a)/Λ) − ½; period Λ, place of a jump a
   Step,      ///< 1 from x ≥ a on, else 0; a
   Sigmoid,   ///< 1/(1 + exp(−(x − a)/w)); a, w
   Hinge,     ///< max(0, x − a); a

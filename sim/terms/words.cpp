@@ -47,8 +47,9 @@ std::string problemOf(const Factor& factor) {
     case Basis::Decay:
     case Basis::Sine:
     case Basis::Cosine:
-    case Basis::Sawtooth:
       return n[0] != 0.0 ? "" : fmt::format("{} needs a {} other than 0", row.word, row.numbered);
+    case Basis::Sawtooth:
+      return n[0] != 0.0 ? "" : "sawtooth needs a period other than 0";
     case Basis::Sigmoid:
     case Basis::Bump:
       return n[1] != 0.0 ? "" : fmt::format("{} needs a width w other than 0", row.word);

@@ -25,7 +25,7 @@ inline constexpr std::array kBasisWords{
     BasisWord{"decay", Basis::Decay, 1, "tau", "exp(-x/tau)"},
     BasisWord{"sine", Basis::Sine, 1, "period", "sin(2 pi x/period)"},
     BasisWord{"cosine", Basis::Cosine, 1, "period", "cos(2 pi x/period)"},
-    BasisWord{"sawtooth", Basis::Sawtooth, 1, "period", "x/period - floor(x/period) - 1/2"},
+    BasisWord{"sawtooth", Basis::Sawtooth, 2, "period, a", "(x - a)/period - floor((x - a)/period) - 1/2"},
     BasisWord{"step", Basis::Step, 1, "a", "1 from x = a on, else 0"},
     BasisWord{"sigmoid", Basis::Sigmoid, 2, "a, w", "1/(1 + exp(-(x - a)/w))"},
     BasisWord{"hinge", Basis::Hinge, 1, "a", "max(0, x - a)"},

@@ -34,12 +34,14 @@ class RandomTerms {
       case Basis::Decay:
       case Basis::Sine:
       case Basis::Cosine:
-      case Basis::Sawtooth:
         factor.numbers = {w};
         break;
       case Basis::Step:
       case Basis::Hinge:
         factor.numbers = {a};
+        break;
+      case Basis::Sawtooth:
+        factor.numbers = {w, a};
         break;
       case Basis::Sigmoid:
       case Basis::Bump:

@@ -35,9 +35,10 @@ TEST(Basis, SineAndCosineAreTheLibrarysWithinRounding) {
 }
 
 TEST(Basis, SawtoothRisesFromMinusHalfToHalfInEachPeriod) {
-  EXPECT_EQ(at(0.0, Basis::Sawtooth, {8.0}), -0.5);
-  EXPECT_EQ(at(6.0, Basis::Sawtooth, {8.0}), 0.25);
-  EXPECT_EQ(at(-2.0, Basis::Sawtooth, {8.0}), 0.25);
+  EXPECT_EQ(at(0.0, Basis::Sawtooth, {8.0, 0.0}), -0.5);
+  EXPECT_EQ(at(6.0, Basis::Sawtooth, {8.0, 0.0}), 0.25);
+  EXPECT_EQ(at(-2.0, Basis::Sawtooth, {8.0, 0.0}), 0.25);
+  EXPECT_EQ(at(3.0, Basis::Sawtooth, {8.0, 3.0}), -0.5);
 }
 
 TEST(Basis, StepSigmoidAndHingeTurnAtA) {
@@ -96,7 +97,7 @@ TEST(Basis, IsNaNOutsideOfWhatItIsDefinedFor) {
 TEST(Basis, IsNaNWhereItsArgumentIs) {
   const std::vector<std::pair<Basis, std::vector<double>>> all{
       {Basis::Power, {0.0}},     {Basis::Log, {}},       {Basis::Decay, {1.0}},      {Basis::Sine, {1.0}},
-      {Basis::Cosine, {1.0}},    {Basis::Sawtooth, {1.0}}, {Basis::Step, {1.0}},     {Basis::Sigmoid, {1.0, 1.0}},
+      {Basis::Cosine, {1.0}},    {Basis::Sawtooth, {1.0, 0.0}}, {Basis::Step, {1.0}},     {Basis::Sigmoid, {1.0, 1.0}},
       {Basis::Hinge, {1.0}},     {Basis::Bump, {1.0, 1.0}}, {Basis::Hat, {0.0, 1.0, 2.0}},
       {Basis::Curve, {0.0, 1.0}}, {Basis::Class, {2.0, 1.0}}, {Basis::Secant, {}},   {Basis::Tangent2, {}}};
   for (const auto& [basis, numbers] : all)
