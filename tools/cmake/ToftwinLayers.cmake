@@ -38,7 +38,7 @@ function(toftwin_library name)
     target_include_directories(${target} PUBLIC $<BUILD_INTERFACE:${root}>)
     target_link_libraries(${target} PUBLIC ${arg_LINKS} PRIVATE ${arg_LIBRARIES}
                           $<BUILD_INTERFACE:toftwin_options>)
-    if(TOFTWIN_QUICK_BUILD AND NOT arg_FOLDER MATCHES "^(sim|tests)/")
+    if(TOFTWIN_QUICK_BUILD AND NOT arg_FOLDER MATCHES "^(sim|tests)/|^calib/loop$")
       # Less optimised, GCC 12 takes optional values that are there for such that may not be; preset dev looks for those.
       target_compile_options(${target} PRIVATE -O1 -Wno-maybe-uninitialized)
     endif()

@@ -1,0 +1,323 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/loop/discovery.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "calib/loop/between_groups.h"
+#include "calib/loop/noise.h"
+#include "calib/loop/projection.h"
+
+namespace toftwin::loop {
+namespace {
+
+constexpr std::size_t kFewestRows = 20;
+/// Effects are looked for in about so many rows at most: what a tenth of the noise hides in these is no matter of a metrologist's.
+constexpr Eigen::Index kSearched = 6000;
+/// From so many groups on a fifth of them is locked, not rows of each.
+constexpr int kGroupsToLock = 8;
+/// Spread that differs by less along all rows hardly changes what counts how much.
+constexpr double kSpreads = 1.4;
+
+// ---- Rows ----------------------------------------------------------------------------------------------------------
+
+/// A column's, or whole groups, or one block of rows that follow each other in a few; never the first or the last, where a change in
+/// time is steepest.
+std::vector<bool> lockedRows(const TableEvidence& table, const table::Readings& readings, const std::vector<Eigen::Index>& rows, double share) {
+  std::vector<bool> locked(rows.size(), false);
+  const auto every = static_cast<std::size_t>(std::lround(1.0 / share));
+  if (!readings.locked.empty()) {
+    for (std::size_t i = 0; i < rows.size(); ++i) locked[i] = readings.locked[table.row[static_cast<std::size_t>(rows[i])]];
+  } else if (table.evidence.groups() >= kGroupsToLock) {
+    for (std::size_t i = 0; i < rows.size(); ++i)
+      locked[i] = static_cast<std::size_t>(table.evidence.group[static_cast<std::size_t>(rows[i])]) % every == every / 2;
+  } else {
+    const std::size_t blocks = std::clamp<std::size_t>(rows.size() / 8, 2 * every, 10 * every);
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const std::size_t at = i * blocks / rows.size();
+      locked[i] = at % every == every / 2;
+    }
+  }
+  return locked;
+}
+
+std::vector<Eigen::Index> without(const Eigen::Index count, const std::vector<NoReadings>& none) {
+  std::vector<bool> is_none(static_cast<std::size_t>(count), false);
+  for (const NoReadings& kind : none)
+    for (const Eigen::Index row : kind.rows) is_none[static_cast<std::size_t>(row)] = true;
+  std::vector<Eigen::Index> rows;
+  for (Eigen::Index i = 0; i < count; ++i)
+    if (!is_none[static_cast<std::size_t>(i)]) rows.push_back(i);
+  return rows;
+}
+
+// ---- The three responses -------------------------------------------------------------------------------------------
+
+/// Of many rows as many as show what there is, in the file's order; steps between them that differ do not alias a period.
+Evidence thinned(const Evidence& all) {
+  if (all.rows() <= kSearched) return all;
+  std::vector<Eigen::Index> rows;
+  const Eigen::Index every = all.rows() / kSearched + 1;
+  for (Eigen::Index i = 0; i < all.rows(); i += 1 + (i * 2654435761LL >> 7) % (2 * every - 1)) rows.push_back(i);
+  return rowsOf(all, rows);
+}
+
+/// Coefficients by all rows, of effects whose shapes were found in some.
+void fitByAll(Evidence& e, Explanation& explanation) {
+  if (explanation.effects.empty()) return;
+  const LeastSquares fit = robustLeastSquares(e, e.y, columnsOf(e, explanation.effects));
+  const Eigen::VectorXd z = fit.residual.cwiseQuotient(e.sigma);
+  const double variance = z.squaredNorm() / std::max(1.0, static_cast<double>(e.rows() - fit.coefficient.size()));
+  Eigen::Index at = 0;
+  for (Effect& effect : explanation.effects) {
+    const auto k = static_cast<Eigen::Index>(effect.shape.columns.size());
+    effect.coefficient = fit.coefficient.segment(at, k);
+    effect.covariance = variance * fit.covariance.block(at, at, k, k);
+    at += k;
+  }
+}
+
+Explanation explained(Evidence& e, const ExplainOptions& options) {
+  if (e.rows() <= kSearched) return explain(e, options);
+  Evidence some = thinned(e);
+  Explanation explanation = explain(some, options);
+  fitByAll(e, explanation);
+  return explanation;
+}
+
+/// The mean: within groups, then between them where their offsets say more than one constant.
+void explainMean(Discovery& d, const DiscoverOptions& options) {
+  Evidence& e = d.open.evidence;
+  const ExplainOptions search{.alpha = options.alpha, .draws = options.draws, .seed = options.seed};
+  if (e.groups() > 1 && chanceOfGroups(e, flexibleColumns(e)) > options.alpha) e = ungrouped(std::move(e));
+  d.mean = explained(e, search);
+  d.has_group_offsets = false;
+  if (e.groups() < 2) return;
+  const auto left = [&] {
+    Eigen::VectorXd y = e.y;
+    for (const Effect& effect : d.mean.effects) y -= columnsOf(e, effect.shape.columns) * effect.coefficient;
+    return y;
+  };
+  while (d.mean.effects.size() < 8) {
+    auto more = explainGroups(e, left(), options.alpha);
+    if (!more) break;
+    const Evidence one = ungrouped(e);
+    const Eigen::MatrixXd columns = columnsOf(e, more->shape.columns);
+    const LeastSquares fit = leastSquares(one, left(), Eigen::VectorXd::Ones(e.rows()), columns);
+    more->coefficient = fit.coefficient, more->covariance = fit.covariance;
+    d.mean.effects.push_back(*std::move(more));
+  }
+  Evidence rest = e;
+  rest.y = left();
+  d.has_group_offsets = chanceOfGroups(rest, Eigen::MatrixXd(e.rows(), 0)) <= options.alpha;
+}
+
+/// Residuals beside everything that was found, offsets of groups included.
+Eigen::VectorXd residualOf(const Discovery& d) {
+  const Evidence& e = d.open.evidence;
+  return leastSquares(e, e.y, e.sigma.array().square().inverse(), columnsOf(e, d.mean.effects)).residual;
+}
+
+/// The logarithm of what is left, as a response of its own. It is not of what is exactly 0.
+Explanation explainSpread(const Discovery& d, const DiscoverOptions& options) {
+  Evidence e = ungrouped(d.open.evidence);
+  const Eigen::VectorXd left = residualOf(d);
+  const double least = 0.05 * std::max(1e-300, robustScale(left));
+  e.y = left.array().abs().max(least).log();
+  e.sigma.setOnes();
+  return explained(e, {.alpha = options.alpha, .draws = options.draws, .seed = options.seed + 1000, .most_effects = 2});
+}
+
+/// What each row scatters by as the spread's effects say, relative to their median.
+Eigen::VectorXd sigmaOf(const Discovery& d, const Evidence& e) {
+  Eigen::VectorXd log_sigma = Eigen::VectorXd::Zero(e.rows());
+  for (const Effect& effect : d.spread.effects) log_sigma += columnsOf(e, effect.shape.columns) * effect.coefficient;
+  log_sigma.array() -= median({log_sigma.begin(), log_sigma.end()});
+  return log_sigma.cwiseMax(-5.0).cwiseMin(5.0).array().exp();
+}
+
+/// What the open rows' model leaves of these rows, offsets of their groups included.
+Eigen::VectorXd beyondOpen(const Discovery& d, const Evidence& rows) {
+  Evidence e = rows;
+  if (d.open.evidence.groups() < 2) e = ungrouped(std::move(e));
+  for (const Effect& effect : d.mean.effects) e.y -= columnsOf(e, effect.shape.columns) * effect.coefficient;
+  return robustLeastSquares(e, e.y, Eigen::MatrixXd(e.rows(), 0)).residual;
+}
+
+std::optional<Explanation> explainShare(const Discovery& d, const DiscoverOptions& options) {
+  Evidence e = ungrouped(d.all.evidence);
+  e.y.setZero();
+  double count = 0.0;
+  // That ranges beyond the longest one wrap is known; what is asked is when a reading fails.
+  for (const NoReadings& kind : d.no_readings)
+    for (const Eigen::Index row : kind.rows)
+      if (kind.kind != NoReading::Wrapped) e.y[row] = 100.0, count += 1.0;
+  if (count < 8.0) return std::nullopt;
+  e.sigma.setOnes();
+  return explained(e, {.alpha = options.alpha, .draws = options.draws, .seed = options.seed + 2000, .most_effects = 2, .is_robust = false});
+}
+
+// ---- The model -----------------------------------------------------------------------------------------------------
+
+terms::Term constantTerm(double value, terms::Quantity quantity) { return {.quantity = quantity, .coefficient = value}; }
+
+std::string titleOf(const Effect& effect, const Discovery& d) {
+  std::string names;
+  for (const std::string& name : effect.shape.covariates) {
+    const bool is_reference = name == rangeName(d.readings) && !d.readings.reference_name.empty();
+    names += (names.empty() ? "" : " and ") + (is_reference ? d.readings.reference_name : name);
+  }
+  return names + ": " + effect.shape.name();
+}
+
+bool isSeries(const Effect& effect) { return effect.shape.covariates == std::vector<std::string>{std::string{kLine}}; }
+bool isGain(const Effect& effect, const Discovery& d) {
+  return effect.shape.covariates == std::vector<std::string>{std::string{rangeName(d.readings)}} && effect.shape.name() == "straight line";
+}
+
+/// Offsets of groups as levels of the column that names them.
+std::vector<terms::Term> groupTerms(const Discovery& d, const Eigen::VectorXd& offset, terms::Quantity quantity) {
+  const std::string& column = d.readings.capture_name.empty() ? d.readings.session_name : d.readings.capture_name;
+  std::vector<terms::Term> all;
+  for (Eigen::Index g = 0; g < offset.size(); ++g) {
+    terms::Factor level{.basis = terms::Basis::Level, .of = {.parts = {{1.0, column}}}, .level = d.open.evidence.group_names[static_cast<std::size_t>(g)]};
+    if (offset[g] != 0.0) all.push_back({.quantity = quantity, .coefficient = offset[g], .factors = {level}});
+  }
+  return all;
+}
+
+/// Everything at once, on open rows: constant, gain, series, effects.
+Model modelOf(const Discovery& d, const std::vector<Effect>& effects, bool has_offsets) {
+  const Evidence& e = d.open.evidence;
+  const auto quantity = d.readings.unit == "mm" ? terms::Quantity::RangeMm : terms::Quantity::Value;
+  Model model{.data = d.readings.file.filename().string(), .unit = d.readings.unit,
+              .measured = d.readings.measured_name.empty() ? d.readings.error_name : d.readings.measured_name,
+              .reference = d.readings.reference_name};
+  Eigen::VectorXd left = e.y;
+  for (const Effect& effect : effects) left -= columnsOf(e, effect.shape.columns) * effect.coefficient;
+  const Eigen::VectorXd offset = has_offsets ? groupOffsets(e, left) : Eigen::VectorXd();
+  if (has_offsets)
+    for (Eigen::Index i = 0; i < left.size(); ++i) left[i] -= offset[e.group[static_cast<std::size_t>(i)]];
+  const Eigen::VectorXd weight = robustWeights(left.array() - median({left.begin(), left.end()}), e.sigma);
+  // A table without a reference has no constant error: what was measured is what is there.
+  const bool has_truth = e.reference.size() > 0 || d.open.measured.size() == 0;
+  const double constant = has_truth ? left.dot(weight) / weight.sum() : 0.0;
+  if (has_truth || effects.empty()) model.effects.push_back({.title = "constant", .role = "constant", .terms = {constantTerm(constant, quantity)}});
+  const auto add = [&](const Effect& effect, const std::string& role) {
+    model.effects.push_back({.title = role == "effect" ? titleOf(effect, d) : role, .role = role, .terms = termsOf(effect.shape, effect.coefficient, quantity), .p = effect.p});
+  };
+  for (const Effect& effect : effects)
+    if (isGain(effect, d)) add(effect, "gain");
+  for (const Effect& effect : effects)
+    if (isSeries(effect)) add(effect, "series");
+  if (has_offsets) model.effects.push_back({.title = "series", .role = "series", .terms = groupTerms(d, offset, quantity)});
+  for (const Effect& effect : effects)
+    if (!isGain(effect, d) && !isSeries(effect)) add(effect, "effect");
+  return model;
+}
+
+/// Simpler models, each by least squares: what a person would try first.
+std::vector<Rung> rungsOf(const Discovery& d, const std::vector<Effect>& effects, bool has_offsets) {
+  const Evidence e = ungrouped(d.open.evidence);
+  const auto quantity = d.readings.unit == "mm" ? terms::Quantity::RangeMm : terms::Quantity::Value;
+  const bool has_truth = e.reference.size() > 0 || d.open.measured.size() == 0;
+  std::vector<Rung> rungs;
+  if (!has_truth) return rungs;
+  const auto fitted = [&](const std::vector<Product>& products) {
+    const Eigen::MatrixXd x = columnsOf(e, products);
+    const LeastSquares fit = leastSquares(e, e.y, Eigen::VectorXd::Ones(e.rows()), x);
+    std::vector<terms::Term> all{constantTerm((e.y - x * fit.coefficient).mean(), quantity)};
+    for (std::size_t i = 0; i < products.size(); ++i)
+      all.push_back({.quantity = quantity, .coefficient = fit.coefficient[static_cast<Eigen::Index>(i)], .factors = products[i]});
+    return all;
+  };
+  rungs.push_back({"constant", fitted({})});
+  std::vector<Product> products;
+  if (e.reference.size() > 0) {
+    products.push_back({{.basis = terms::Basis::Power, .of = {.parts = {{1.0, std::string{rangeName(d.readings)}}}}, .numbers = {1.0}}});
+    rungs.push_back({"gain", fitted(products)});
+  }
+  for (const Effect& effect : effects) {
+    if (!isSeries(effect)) continue;
+    products.insert(products.end(), effect.shape.columns.begin(), effect.shape.columns.end());
+    if (!rungs.empty() && rungs.back().name == "series") rungs.pop_back();
+    rungs.push_back({"series", fitted(products)});
+  }
+  if (has_offsets) {
+    const auto levels = groupTerms(d, Eigen::VectorXd::Ones(d.open.evidence.groups()), quantity);
+    for (std::size_t i = 1; i < levels.size(); ++i) products.push_back(levels[i].factors);
+    rungs.push_back({"series", fitted(products)});
+  }
+  return rungs;
+}
+
+/// The file as it would be written, read again and applied to rows: what is judged is what a user has.
+Result<> judge(Discovery& d, Model model) {
+  auto read = parseModel(toToml(model), "model.toml");
+  if (!read) return read.error();
+  d.model = *std::move(read);
+  d.seen = ladderOf(d.open, d.model), d.unseen = ladderOf(d.locked, d.model);
+  return {};
+}
+
+Result<> writeModel(Discovery& d) {
+  const auto whole = [&](const std::vector<Effect>& effects, bool has_offsets) {
+    Model model = modelOf(d, effects, has_offsets);
+    model.rungs = rungsOf(d, effects, has_offsets);
+    return judge(d, std::move(model));
+  };
+  if (auto judged = whole(d.mean.effects, d.has_group_offsets); !judged) return judged;
+  if (d.unseen.steps.size() < 2) return {};
+  d.is_written = d.unseen.last() < d.unseen.first();
+  return {};
+}
+
+}  // namespace
+
+Result<Discovery> discover(table::Readings readings, const DiscoverOptions& options) {
+  Discovery d{.readings = std::move(readings)};
+  d.all = evidenceOf(d.readings);
+  if (static_cast<std::size_t>(d.all.evidence.rows()) < kFewestRows) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: {} rows have all values; at least {} are needed", d.readings.file.string(), d.all.evidence.rows(), kFewestRows)};
+  }
+  if (d.all.evidence.covariates.empty())
+    return Error{Error::Code::InvalidArgument, fmt::format("{}: has no column that the error could go with", d.readings.file.string())};
+  d.no_readings = findNoReadings(d.all.evidence, d.all.measured);
+  const auto split = [&] {
+    const auto rows = without(d.all.evidence.rows(), d.no_readings);
+    const auto locked = lockedRows(d.all, d.readings, rows, options.locked_share);
+    std::vector<Eigen::Index> open_rows, locked_rows;
+    for (std::size_t i = 0; i < rows.size(); ++i) (locked[i] ? locked_rows : open_rows).push_back(rows[i]);
+    d.open = rowsOf(d.all, open_rows), d.locked = rowsOf(d.all, locked_rows);
+  };
+  split();
+  explainMean(d, options);
+  d.spread = explainSpread(d, options);
+  const Eigen::VectorXd sigma = sigmaOf(d, d.open.evidence);
+  const bool spreads = d.readings.sigma.empty() && sigma.maxCoeff() > kSpreads * sigma.minCoeff();
+  if (spreads) d.open.evidence.sigma = sigma;
+  // Locked rows may jump as others do: what measures nothing cannot judge.
+  Evidence measuring = rowsOf(d.all.evidence, without(d.all.evidence.rows(), d.no_readings));
+  if (spreads) measuring.sigma = sigmaOf(d, measuring);
+  NoReadings jumps = findJumps(measuring, beyondOpen(d, measuring));
+  if (!jumps.rows.empty()) {
+    const auto rows = without(d.all.evidence.rows(), d.no_readings);
+    for (Eigen::Index& row : jumps.rows) row = rows[static_cast<std::size_t>(row)];
+    d.no_readings.push_back(jumps);
+    split();
+    if (spreads) d.open.evidence.sigma = sigmaOf(d, d.open.evidence);
+  }
+  if (spreads || !jumps.rows.empty()) explainMean(d, options);
+  d.share = explainShare(d, options);
+  const Noise noise = judgeNoise(d.open.evidence, columnsOf(d.open.evidence, d.mean.effects));
+  d.noise = robustScale(noise.residual);
+  d.repeats = repeatsOf(d.open.evidence);
+  if (auto written = writeModel(d); !written) return written.error();
+  return d;
+}
+
+}  // namespace toftwin::loop

@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "calib/loop/explain.h"
+#include "calib/loop/ladder.h"
+#include "calib/loop/no_readings.h"
+
+namespace toftwin::loop {
+
+struct DiscoverOptions {
+  double alpha = 0.01;         ///< chance that something is found where there is nothing
+  double locked_share = 0.2;   ///< of the rows, only for judging
+  int draws = 400;
+  std::uint64_t seed = 1;
+};
+
+/// All that was found out about a table.
+struct Discovery {
+  table::Readings readings{};
+  TableEvidence all{};           ///< rows with an error, in the file's order
+  TableEvidence open{}, locked{};  ///< those that measure something: for the search, and for judging it
+  std::vector<NoReadings> no_readings{};  ///< numbers of rows are of `all`
+  Explanation mean{};            ///< what the error goes with; effects between groups come last
+  Explanation spread{};          ///< what the logarithm of its magnitude goes with
+  std::optional<Explanation> share{};  ///< what the share of rows that measure nothing goes with, where there are enough
+  bool has_group_offsets = false;
+  double noise = 0.0;            ///< robust deviation of the rows beside a model that is flexible along each column
+  Repeats repeats{};
+  Model model{};
+  bool is_written = true;        ///< false: the model is no better than none on locked rows
+  Ladder seen{}, unseen{};       ///< of open rows, of locked rows: the written model's
+};
+
+Result<Discovery> discover(table::Readings readings, const DiscoverOptions& options);
+
+}  // namespace toftwin::loop

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+
+#include <toftwin/result.h>
+
+#include "calib/compare/report.h"
+#include "calib/loop/discovery.h"
+
+namespace toftwin::loop {
+
+/// The ladder first, then the error over the reference, then each effect with its curve over its own dots.
+compare::Report reportOf(const Discovery& discovery);
+/// All numbers, for programs: report.json.
+compare::Json dataOf(const Discovery& discovery);
+/// The ladder as a few lines for a terminal.
+std::string ladderText(const Ladder& ladder, const std::string& unit);
+
+/// Writes index.html, report.json, report.md and, unless it is worse than none, model.toml; gives the page's path.
+Result<std::filesystem::path> write(const Discovery& discovery, const std::filesystem::path& folder);
+
+}  // namespace toftwin::loop

@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+
+#include "calib/loop/evidence.h"
+
+namespace toftwin::loop {
+
+/// Weighted rows without what the current model can explain: of a column x it leaves
+///     √w x − (offsets of groups) − (what the columns of the model explain),
+/// so that products of two such columns are efficient scores and their information.
+class Projection {
+ public:
+  /// `weight`: of each row. `model`: the columns that are known already; groups' offsets are always projected out.
+  Projection(const Evidence& evidence, const Eigen::VectorXd& weight, const Eigen::MatrixXd& model);
+
+  [[nodiscard]] Eigen::MatrixXd operator()(Eigen::MatrixXd columns) const;
+  /// How many numbers it takes out of the rows.
+  [[nodiscard]] Eigen::Index rank() const { return basis_.cols() + static_cast<Eigen::Index>(sums_.size()); }
+
+ private:
+  void takeOffsets(Eigen::MatrixXd& scaled) const;
+
+  Eigen::VectorXd root_weight_;
+  std::vector<int> group_;
+  std::vector<double> sums_;  ///< of the weights of each group
+  Eigen::MatrixXd basis_;
+};
+
+/// Weights that a far row has less of: 1/σ² · min(1, 2/|z|), z the residual over σ and the residuals' own scale [Huber 1964].
+Eigen::VectorXd robustWeights(const Eigen::VectorXd& residual, const Eigen::VectorXd& sigma);
+/// 1.4826 times the median magnitude.
+double robustScale(const Eigen::VectorXd& residual);
+double robustScale(std::vector<double> values);
+double median(std::vector<double> values);
+
+/// Coefficients of the least weighted squares of y over these columns beside groups' offsets, and what is left.
+struct LeastSquares {
+  Eigen::VectorXd coefficient{};
+  Eigen::MatrixXd covariance{};  ///< for noise of variance 1/weight
+  Eigen::VectorXd residual{};    ///< unweighted
+};
+LeastSquares leastSquares(const Evidence& evidence, const Eigen::VectorXd& y, const Eigen::VectorXd& weight,
+                          const Eigen::MatrixXd& columns);
+/// The same with robust weights, found by turns.
+LeastSquares robustLeastSquares(const Evidence& evidence, const Eigen::VectorXd& y, const Eigen::MatrixXd& columns);
+
+}  // namespace toftwin::loop
