@@ -57,6 +57,7 @@ Command renderCommand();
 Command calibrateCommand();
 Command compareCommand();
 Command discoverCommand();
+Command correctCommand();
 Command suitCommand();
 Command locateCommand();
 Command planCommand();

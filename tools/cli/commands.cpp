@@ -9,7 +9,7 @@ std::span<const Command> commands() {
   static const std::array kCommands{
       listCommand(),      infoCommand(),       grabCommand(),       recordCommand(),  replayCommand(),
       poseCommand(),      rigCommand(),        setCommand(),        triggerCommand(), renderCommand(),
-      calibrateCommand(), planCommand(),       measureCommand(),    compareCommand(), discoverCommand(),
+      calibrateCommand(), planCommand(),       measureCommand(),    compareCommand(), discoverCommand(), correctCommand(),
       suitCommand(),      logCommand(),        trendCommand(),      locateCommand(),  usbCommand(),
       doctorCommand(),    complianceCommand(), certificateCommand(), completionCommand(),
   };

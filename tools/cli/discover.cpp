@@ -8,8 +8,10 @@
 #include <system_error>
 
 #include "calib/discover/campaign/before_search.h"
-#include "calib/discover/discover_table.h"
-#include "calib/discover/table_camera.h"
+#include "calib/loop/answer.h"
+#include "calib/loop/camera.h"
+#include "calib/loop/page.h"
+#include "calib/table/readings.h"
 #include "tools/cli/arguments.h"
 #include "tools/cli/command.h"
 #include "tools/cli/discover_campaign.h"
@@ -47,12 +49,53 @@ Result<> check(const Options& options) {
 }
 
 /// The camera with what was found, beside the page.
-Result<> writeCamera(const discover::TableDiscovery& discovery, const discover::CameraText& camera,
-                     const std::filesystem::path& folder) {
-  const auto mended = discover::cameraWith(discovery, camera);
+Result<> writeCamera(const loop::Discovery& discovery, const loop::CameraText& camera, const std::filesystem::path& folder) {
+  if (!discovery.is_written) return {};
+  const auto mended = loop::cameraWith(discovery, camera);
   if (!mended) return mended.error();
   for (const std::string& note : mended->notes) fmt::print("note: {}\n", note);
   return writeWhole(folder / "camera.toml", mended->toml);
+}
+
+/// The answer in the order of the page: the ladder, then each effect, then what was set aside, then what cannot be told.
+void print(const loop::Discovery& discovery) {
+  const loop::Answer answer = loop::answerOf(discovery);
+  fmt::print("{}\n\n", answer.headline);
+  const bool is_judged = discovery.unseen.rows > 0;
+  const loop::Ladder& ladder = is_judged ? discovery.unseen : discovery.seen;
+  fmt::print("What is left, RMS of {} rows {}:\n{}\n", ladder.rows, is_judged ? "that nothing was fitted to" : "that it was fitted to",
+             loop::ladderText(ladder, discovery.readings.unit));
+  for (const std::string& sentence : answer.effects) fmt::print("{}\n", sentence);
+  for (const std::string& sentence : answer.readings) fmt::print("{}\n", sentence);
+  for (const std::string& sentence : answer.cautions) fmt::print("note: {}\n", sentence);
+  for (const auto* notes : {&discovery.readings.notes, &discovery.all.notes})
+    for (const std::string& note : *notes) fmt::print("note: {}\n", note);
+}
+
+Result<Exit> discoverTable(const Options& options) {
+  table::TableMap map;
+  if (!options.map.empty()) {
+    auto loaded = table::loadTableMap(options.map);
+    if (!loaded) return loaded.error();
+    map = *std::move(loaded);
+  }
+  std::optional<loop::CameraText> camera;
+  if (!options.campaign.model.empty()) {
+    auto loaded = loop::loadCamera(options.campaign.model);
+    if (!loaded) return loaded.error();
+    camera = *std::move(loaded);
+  }
+  auto readings = table::readReadings(options.data, map);
+  if (!readings) return readings.error();
+  const auto discovery = loop::discover(*std::move(readings), {.alpha = map.alpha, .locked_share = map.locked_share, .draws = map.draws, .seed = map.seed});
+  if (!discovery) return discovery.error();
+  const auto page = loop::write(*discovery, options.output);
+  if (!page) return page.error();
+  if (camera)
+    if (auto written = writeCamera(*discovery, *camera, options.output); !written) return written.error();
+  print(*discovery);
+  fmt::print("{}\n", page->string());
+  return Exit::Ok;
 }
 
 Result<Exit> act(const Options& options) {
@@ -60,27 +103,7 @@ Result<Exit> act(const Options& options) {
     return Error{Error::Code::NotFound, fmt::format("{}: there is no such file or folder", options.data)};
   if (auto writable = discover::checkCanWrite(options.output); !writable) return writable.error();
   if (options.isRun()) return discoverRun(options.data, options.output, options.campaign);
-  discover::TableMap map;
-  if (!options.map.empty()) {
-    auto loaded = discover::loadTableMap(options.map);
-    if (!loaded) return loaded.error();
-    map = *std::move(loaded);
-  }
-  std::optional<discover::CameraText> camera;
-  if (!options.campaign.model.empty()) {
-    auto loaded = discover::loadCamera(options.campaign.model);
-    if (!loaded) return loaded.error();
-    camera = *std::move(loaded);
-  }
-  const auto discovery = discover::discoverTable(options.data, map);
-  if (!discovery) return discovery.error();
-  const auto page = discover::writeDiscovery(*discovery, options.output);
-  if (!page) return page.error();
-  for (const auto& doubt : discovery->open.doubts) fmt::print("note: {}\n", doubt);
-  if (camera)
-    if (auto written = writeCamera(*discovery, *camera, options.output); !written) return written.error();
-  fmt::print("{}\n{}\n", discover::verdictOf(*discovery), page->string());
-  return Exit::Ok;
+  return discoverTable(options);
 }
 
 Run add(Arguments& args) {
