@@ -67,6 +67,22 @@ Eigen::VectorXd Screening::deviates(const std::vector<Product>& products) const 
   return out;
 }
 
+/// Blocks that hold several times the energy of most count as those do: signs of two or three blocks that hold nearly all of it
+/// say nothing, and those of the others would not be heard.
+void evenOut(Eigen::VectorXd& left, const Evidence& evidence) {
+  std::vector<double> energy(static_cast<std::size_t>(evidence.blocks), 0.0), rows(energy.size(), 0.0);
+  for (Eigen::Index i = 0; i < left.size(); ++i) {
+    const auto block = static_cast<std::size_t>(evidence.block[static_cast<std::size_t>(i)]);
+    energy[block] += left[i] * left[i], rows[block] += 1.0;
+  }
+  for (std::size_t b = 0; b < energy.size(); ++b) energy[b] /= std::max(1.0, rows[b]);
+  const double usual = 2.0 * median(energy);
+  for (Eigen::Index i = 0; i < left.size(); ++i) {
+    const double own = energy[static_cast<std::size_t>(evidence.block[static_cast<std::size_t>(i)])];
+    if (own > usual && usual > 0.0) left[i] *= std::sqrt(usual / own);
+  }
+}
+
 /// The family at its best inner numbers: of the data, and of each draw by itself.
 struct Best {
   Score score;
@@ -99,6 +115,8 @@ Scores screen(const Evidence& evidence, const Eigen::VectorXd& residual, const E
   Screening screening{.evidence = evidence, .projection = Projection{evidence, weight, model},
                       .left = {}, .signs = drawSigns(evidence.blocks, draws, seed)};
   screening.left = screening.projection(residual);
+  // Blocks of a row or two have no energy of their own that rows' weights have not bounded.
+  if (evidence.rows() >= 4 * evidence.blocks) evenOut(screening.left, evidence);
   const double freedom = std::max(1.0, static_cast<double>(residual.size() - screening.projection.rank()));
   const double scale = std::sqrt(screening.left.squaredNorm() / freedom);
   if (!(scale > 0.0)) return {};
