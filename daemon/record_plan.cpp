@@ -92,7 +92,7 @@ std::uint64_t freeBytesAt(const fs::path& folder) {
 Result<RecordPlan> readRecordPlan(const RecordKeys& keys, const fs::path& folder) {
   const auto wrong = [](std::string what) { return Error{Error::Code::InvalidArgument, std::move(what)}; };
   RecordPlan plan;
-  plan.pattern = (folder / keys.file).lexically_normal();
+  plan.pattern = fs::absolute(folder / keys.file).lexically_normal();
   if (plan.pattern.extension() != ".mcap") plan.pattern += ".mcap";
   if (folder.empty() && !fs::path{keys.file}.is_absolute())
     return wrong("file is relative to recording_folder, which is not set");

@@ -8,6 +8,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <chrono>
 #include <cstring>
 #include <utility>
 
@@ -49,16 +50,23 @@ Result<OutputFile> OutputFile::create(const std::filesystem::path& path, bool ov
 }
 
 OutputFile::OutputFile(OutputFile&& other) noexcept
-    : fd_(std::exchange(other.fd_, -1)), size_(other.size_), path_(std::move(other.path_)) {}
+    : fd_(std::exchange(other.fd_, -1)),
+      size_(other.size_),
+      path_(std::move(other.path_)),
+      is_in_folder_(other.is_in_folder_),
+      syncing_(std::move(other.syncing_)) {}
 
 OutputFile& OutputFile::operator=(OutputFile&& other) noexcept {
   std::swap(fd_, other.fd_);
   std::swap(size_, other.size_);
   std::swap(path_, other.path_);
+  std::swap(is_in_folder_, other.is_in_folder_);
+  std::swap(syncing_, other.syncing_);
   return *this;
 }
 
 OutputFile::~OutputFile() {
+  if (syncing_.valid()) syncing_.wait();
   if (fd_ >= 0) ::close(fd_);
 }
 
@@ -87,20 +95,34 @@ Result<std::uint64_t> OutputFile::freeBytes() const {
   return std::uint64_t{disk.f_bavail} * disk.f_frsize;
 }
 
+namespace {
+
+/// The file's bytes, and its name if that is not there for certain.
+int bringToDisk(int fd, const std::filesystem::path& folder, bool is_in_folder) {
+  // EINVAL: a pipe or a device such as /dev/null, which has nothing to wait for.
+  if (::fdatasync(fd) != 0 && errno != EINVAL) return errno;
+  if (is_in_folder) return 0;
+  const int opened = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (opened < 0) return errno;
+  const int number = ::fsync(opened) != 0 && errno != EINVAL ? errno : 0;
+  ::close(opened);
+  return number;
+}
+
+}  // namespace
+
 Result<> OutputFile::sync() {
-  if (::fdatasync(fd_) != 0 && errno != EINVAL) return systemError(path_, "write to the disk", errno);
-  if (is_in_folder_) return {};
+  if (syncing_.valid()) {
+    if (syncing_.wait_for(std::chrono::seconds{0}) != std::future_status::ready) return {};
+    if (const int number = syncing_.get(); number != 0) return systemError(path_, "write to the disk", number);
+  }
   const auto folder = path_.has_parent_path() ? path_.parent_path() : std::filesystem::path{"."};
-  const int fd = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (fd < 0) return systemError(folder, "open this folder", errno);
-  const int number = ::fsync(fd) != 0 && errno != EINVAL ? errno : 0;
-  ::close(fd);
-  if (number != 0) return systemError(folder, "write to the disk", number);
-  is_in_folder_ = true;
+  syncing_ = std::async(std::launch::async, bringToDisk, fd_, folder, std::exchange(is_in_folder_, true));
   return {};
 }
 
 Result<> OutputFile::close() {
+  if (syncing_.valid()) syncing_.wait();  // what it could not do, the next line cannot, either
   const int fd = std::exchange(fd_, -1);
   if (fd < 0) return {};
   // EINVAL: a pipe or a device such as /dev/null, which has nothing to wait for.

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <future>
 #include <initializer_list>
 #include <span>
 #include <string>
@@ -26,7 +27,9 @@ class OutputFile {
   /// All of the bytes or none. Error StorageFull where the disk, the quota or a limit is at its
   /// end.
   Result<> append(std::span<const std::byte> bytes);
-  /// Waits until all that was appended is on the disk, with the file's name in its folder.
+  /// Has what was appended brought to the disk, with the file's name in its folder, by a thread of its own: whoever
+  /// writes goes on, however slow the disk. Where that is under way already, what came since is the next call's. The error
+  /// is that of the one before.
   Result<> sync();
   /// Waits until the bytes are on the disk, and closes.
   Result<> close();
@@ -40,7 +43,8 @@ class OutputFile {
   int fd_ = -1;
   std::uint64_t size_ = 0;
   std::filesystem::path path_;
-  bool is_in_folder_ = false;  ///< for certain, after a power cut, too
+  bool is_in_folder_ = false;  ///< for certain, after a power cut, too, once `syncing_` is done
+  std::future<int> syncing_;   ///< the error number of what went wrong, or 0
 };
 
 /// A file for reading at any place; its size is that at opening.

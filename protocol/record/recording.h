@@ -27,7 +27,7 @@ struct WriterOptions {
   /// filled.
   std::uint64_t keep_free_bytes = 0;
   bool overwrite = false;  ///< otherwise a file that is there already is an error
-  /// Waits for the disk after every chunk, so that a power cut loses no more than the open one.
+  /// Has every chunk brought to the disk, aside, so that a power cut loses what came while that took.
   bool sync_chunks = false;
   /// The first frame is a chunk of its own, so that a file is without frames for no longer than that takes to write.
   bool first_frame_at_once = false;

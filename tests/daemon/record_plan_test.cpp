@@ -101,6 +101,9 @@ TEST_F(Plan, RemovesNothingWhereAllIsToBeKeptHoweverFullTheDisk) {
 }
 
 TEST_F(Plan, SaysHowLongTheDiskLasts) {
+  const auto here = readRecordPlan(keysOf("a"), ".");  // of a configuration that was named without a folder
+  ASSERT_TRUE(here.ok());
+  EXPECT_TRUE(here->pattern.is_absolute());
   EXPECT_THAT(howLong(plan(keysOf("a", "", "3600MB")), 0, 1e6),
               testing::AllOf(HasSubstr("1.0 h at 1.0 MB/s"), HasSubstr("the oldest files make room")));
 }

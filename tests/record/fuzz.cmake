@@ -7,7 +7,7 @@ foreach(target mcap settings)
   add_dependencies(fuzzers fuzz_${target})
   file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_${target}_corpus)
   add_test(NAME fuzz_${target}
-           COMMAND fuzz_${target} -max_total_time=3 -max_len=8192 -print_final_stats=1
+           COMMAND fuzz_${target} -max_total_time=3 -max_len=32768 -print_final_stats=1
                    ${CMAKE_BINARY_DIR}/fuzz_${target}_corpus ${folder}/${target}_corpus)
   set_tests_properties(fuzz_${target} PROPERTIES TIMEOUT 120)
 endforeach()
