@@ -2,6 +2,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 
 #include <toftwin/names.h>
 
@@ -69,10 +70,19 @@ Survey survey(record::Reader& reader, const std::string& file) {
   return found;
 }
 
-/// Of the source that was recorded longest, in seconds: what passed, whatever clocks were set meanwhile.
+/// From the first frame of any source to the last of any, in seconds: what passed, whatever clocks were set meanwhile. A source
+/// that began within a day of the first began so much later; more than that is a clock that was set between them.
 double lengthOf(const Survey& found) {
-  std::int64_t longest_ns = 0;
-  for (const auto& [source, times] : found.times) longest_ns = std::max(longest_ns, record::recordedTime(times).length_ns);
+  constexpr std::int64_t kDay_ns = 86'400'000'000'000;
+  std::int64_t first_ns = std::numeric_limits<std::int64_t>::max(), longest_ns = 0;
+  for (const auto& [source, times] : found.times)
+    if (!times.empty()) first_ns = std::min(first_ns, times.front().received_ns);
+  for (const auto& [source, times] : found.times) {
+    if (times.empty()) continue;
+    const double later_ns = static_cast<double>(times.front().received_ns) - static_cast<double>(first_ns);
+    const std::int64_t offset_ns = later_ns < static_cast<double>(kDay_ns) ? times.front().received_ns - first_ns : 0;
+    longest_ns = std::max(longest_ns, offset_ns + std::min(record::recordedTime(times).length_ns, std::numeric_limits<std::int64_t>::max() - offset_ns));
+  }
   return 1e-9 * static_cast<double>(longest_ns);
 }
 
