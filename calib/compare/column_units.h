@@ -7,16 +7,9 @@
 
 #include <toftwin/result.h>
 
+#include "calib/table/units.h"
+
 namespace toftwin::compare {
-
-/// What is converted into each other.
-enum class Quantity { Length, Time, Illuminance, Speed, Pixels };
-
-struct ColumnUnit {
-  std::string_view name;  ///< as people write it: "ms"
-  Quantity quantity;
-  double in_base;  ///< metres, seconds, kilolux, m/s, pixels
-};
 
 /// A column as --columns names it: "-t [ms]", "time_h" or "elapsed=min".
 struct ColumnName {
@@ -27,11 +20,8 @@ struct ColumnName {
 };
 ColumnName columnNameOf(std::string_view given);
 
-/// In any case but for a capital M before small letters, which would be mega. Null: none that is known.
-const ColumnUnit* findUnit(std::string_view name);
-
 /// The unit that ends one of our own names of columns, such as "speed_m_per_s"; null: it has none.
-const ColumnUnit* unitOf(std::string_view column);
+const table::Unit* unitOf(std::string_view column);
 
 /// What the values of `there` are multiplied by to be in `wanted`'s unit; nothing where `there` says no unit
 /// and `wanted` has one. Errors: an unknown unit, one of another quantity.

@@ -9,7 +9,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "calib/compare/csv.h"
+#include "calib/compare/thesis_data.h"
 #include "calib/compare/live_report.h"
 #include "calib/compare/real_data.h"
 #include "protocol/types/counted.h"

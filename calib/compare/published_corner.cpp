@@ -4,10 +4,10 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/csv.h"
 #include "calib/compare/published_model.h"
 #include "calib/compare/real_published.h"
 #include "calib/compare/simulated_line.h"
+#include "calib/table/table.h"
 
 namespace toftwin::compare {
 namespace {
@@ -115,7 +115,7 @@ Result<TableBlock> ownCheck(const RealDataJob& job, PublishedCorner& result) {
 }  // namespace
 
 Result<PublishedLine> loadPublishedCorner(const std::filesystem::path& file, std::size_t every) {
-  const auto columns = loadColumns(file, {"x_mm", "z_mm", "reference_z_mm"});
+  const auto columns = table::readNumbers(file, {"x_mm", "z_mm", "reference_z_mm"});
   if (!columns) return columns.error();
   PublishedLine all, some;
   for (std::size_t i = 0; i < (*columns)[0].size(); ++i) {

@@ -4,12 +4,12 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/csv.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/real_fits.h"
 #include "calib/compare/residual.h"
 #include "calib/compare/simulated_line.h"
 #include "calib/compare/simulated_wall.h"
+#include "calib/table/table.h"
 
 namespace toftwin::compare {
 namespace {
@@ -85,7 +85,7 @@ std::vector<std::vector<std::string>> bins(const ErrorTable& table,
 }  // namespace
 
 Result<Finding> judgeDistance(const RealDataJob& job, RealCamera& camera) {
-  const auto columns = loadColumns(job.folder / "distance_error" / (camera.name + ".csv"),
+  const auto columns = table::readNumbers(job.folder / "distance_error" / (camera.name + ".csv"),
                                    {"reference_mm", "reference_minus_measured_mm"});
   if (!columns) return columns.error();
   const auto [table, other] = sessions(*columns, camera.name == "o3d303");

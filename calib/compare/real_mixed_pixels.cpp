@@ -8,11 +8,11 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/csv.h"
 #include "calib/compare/held_out.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/residual.h"
 #include "calib/compare/simulated_line.h"
+#include "calib/table/table.h"
 
 namespace toftwin::compare {
 namespace {
@@ -67,7 +67,7 @@ struct Measured {
   double left_t = 0.0;   ///< the ray to the left edge
 };
 Result<Measured> measuredEdges(const std::filesystem::path& file) {
-  const auto columns = loadColumns(file, {"x_mm", "z_mm", "background_z_mm"});
+  const auto columns = table::readNumbers(file, {"x_mm", "z_mm", "background_z_mm"});
   if (!columns) return columns.error();
   std::vector<double> t, before_wall, wall;
   for (std::size_t i = 0; i < (*columns)[0].size(); ++i) {

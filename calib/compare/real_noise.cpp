@@ -4,11 +4,11 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/csv.h"
 #include "calib/compare/fits.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/residual.h"
 #include "calib/compare/simulated_wall.h"
+#include "calib/table/table.h"
 
 namespace toftwin::compare {
 namespace {
@@ -100,11 +100,11 @@ Curve sorted(const std::vector<double>& x, const std::vector<double>& y, std::st
 }  // namespace
 
 Result<Finding> judgeNoise(const RealDataJob& job, const RealCamera& camera) {
-  const auto over_distance = loadColumns(
+  const auto over_distance = table::readNumbers(
       job.folder / "noise" / (camera.name + "_sigma_vs_distance.csv"), {"distance_mm", "sigma_mm"});
   if (!over_distance) return over_distance.error();
   const auto over_intensity =
-      loadColumns(job.folder / "noise" / (camera.name + "_sigma_vs_intensity.csv"),
+      table::readNumbers(job.folder / "noise" / (camera.name + "_sigma_vs_intensity.csv"),
                   {"intensity_counts", "sigma_mm"});
   if (!over_intensity) return over_intensity.error();
   const auto model = sim::SensorModel::preset(camera.name);

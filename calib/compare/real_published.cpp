@@ -6,12 +6,12 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/csv.h"
 #include "calib/compare/fits.h"
 #include "calib/compare/published_model.h"
 #include "calib/compare/real_box.h"
 #include "calib/compare/scan_line.h"
 #include "calib/compare/simulated_line.h"
+#include "calib/table/table.h"
 
 namespace toftwin::compare {
 namespace {
@@ -25,10 +25,10 @@ struct LeaningWall {
 
 Result<LeaningWall> loadWall(const RealDataJob& job, const std::string& file) {
   const auto folder = job.folder / "published_simulation";
-  const auto columns = loadColumns(folder / file, {"reference_mm", "reference_minus_measured_mm"});
+  const auto columns = table::readNumbers(folder / file, {"reference_mm", "reference_minus_measured_mm"});
   if (!columns) return columns.error();
   // The rays are those of the corner: the same camera, row by row.
-  const auto rays = loadColumns(folder / "corner_path_length_16_reference.csv", {"x_mm", "z_mm"});
+  const auto rays = table::readNumbers(folder / "corner_path_length_16_reference.csv", {"x_mm", "z_mm"});
   if (!rays) return rays.error();
   if ((*rays)[0].size() != (*columns)[0].size())
     return Error{Error::Code::InvalidArgument,

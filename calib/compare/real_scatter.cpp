@@ -9,12 +9,12 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/csv.h"
 #include "calib/compare/held_out.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/residual.h"
 #include "calib/compare/scatter_laws.h"
 #include "calib/compare/simulated_line.h"
+#include "calib/table/table.h"
 
 namespace toftwin::compare {
 
@@ -127,7 +127,7 @@ Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding&
   for (std::size_t i = 0; i < camera.runs.size(); ++i) {
     const auto file =
         job.folder / "lens_scatter" / camera.name / fmt::format("run_{:02}.csv", camera.runs[i]);
-    const auto columns = loadColumns(file, {"x_mm", "z_mm", "background_z_mm"});
+    const auto columns = table::readNumbers(file, {"x_mm", "z_mm", "background_z_mm"});
     if (!columns) return columns.error();
     auto run = toRun(*columns, preset, file);
     if (!run) return run.error();
@@ -196,7 +196,7 @@ Result<> addCamera(const RealDataJob& job, const ScatterCamera& camera, Finding&
 /// The infrared image beside the edge of a wide bright plate, as it was measured.
 Result<> addEdgeProfile(const RealDataJob& job, const std::string& name, const std::string& title,
                         TableBlock& table) {
-  const auto columns = loadColumns(job.folder / "lens_scatter" / (name + "_edge_profile.csv"),
+  const auto columns = table::readNumbers(job.folder / "lens_scatter" / (name + "_edge_profile.csv"),
                                    {"offset_px", "relative_intensity"});
   if (!columns) return columns.error();
   std::vector<std::string> row{title};

@@ -5,12 +5,12 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/csv.h"
 #include "calib/compare/fits.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/residual.h"
 #include "calib/compare/simulated_line.h"
 #include "calib/compare/simulated_wall.h"
+#include "calib/table/table.h"
 #include "sim/sensor/sensor_model.h"
 
 namespace toftwin::compare {
@@ -102,7 +102,7 @@ struct Split {
 
 Result<Finding> judgeWarmUp(const RealDataJob& job, const RealCamera& camera) {
   const auto columns =
-      loadColumns(job.folder / "warmup_drift" / (camera.name + ".csv"), {"time_s", "depth_mm"});
+      table::readNumbers(job.folder / "warmup_drift" / (camera.name + ".csv"), {"time_s", "depth_mm"});
   if (!columns) return columns.error();
   const Series all{(*columns)[0], (*columns)[1]};
   const double end = all.time_s.back(), half = 0.5 * (all.time_s.front() + end);

@@ -10,8 +10,8 @@
 #include <fmt/format.h>
 #include <toftwin/nan.h>
 
-#include "calib/compare/csv.h"
 #include "calib/compare/statistics.h"
+#include "calib/table/table.h"
 
 namespace toftwin::compare {
 namespace {
@@ -117,7 +117,7 @@ ScanLine toScanLine(std::span<const double> x_mm, std::span<const double> z_mm) 
 }
 
 Result<ScanLine> loadScanLine(const std::filesystem::path& file) {
-  auto columns = loadColumns(file, {"x_mm", "z_mm"});
+  auto columns = table::readNumbers(file, {"x_mm", "z_mm"});
   if (!columns) return columns.error();
   return toScanLine((*columns)[0], (*columns)[1]);
 }

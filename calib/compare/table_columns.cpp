@@ -5,25 +5,25 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 #include <string_view>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "calib/compare/column_units.h"
-#include "calib/compare/csv.h"
 #include "calib/compare/traits/repeats.h"
+#include "calib/table/covariate.h"
+#include "calib/table/sentinels.h"
+#include "calib/table/table.h"
+#include "calib/table/table.h"
 #include "protocol/types/counted.h"
 
 namespace toftwin::compare {
 namespace {
 
-Error ofTable(const TableJob& job, const Error& error) {
-  return {error.code, fmt::format("{}: {}", job.file.string(), error.message)};
-}
-
-bool isOf(Quantity quantity, const char* column) {
-  const ColumnUnit* unit = unitOf(column);
+bool isOf(table::Quantity quantity, const char* column) {
+  const table::Unit* unit = unitOf(column);
   return unit != nullptr && unit->quantity == quantity;
 }
 
@@ -49,7 +49,7 @@ std::string noteOnSize(const char* column, const std::vector<double>& values) {
   constexpr double kFarthest_m = 300.0;
   double most_m = 0.0;
   for (const double one : values) {
-    if (std::isfinite(one)) most_m = std::max(most_m, std::abs(one) * unitOf(column)->in_base);
+    if (std::isfinite(one)) most_m = std::max(most_m, 1e-3 * std::abs(one) * unitOf(column)->in_base);
   }
   if (!(most_m > kFarthest_m)) return {};
   return fmt::format("{} goes up to {:.4g} m, which may be another unit", column, most_m);
@@ -79,7 +79,7 @@ std::optional<double> stepOf(std::vector<double> values) {
 std::string noteOnSteps(const char* column, const std::vector<double>& values) {
   const auto step = stepOf(values);
   if (!step) return {};
-  const ColumnUnit& unit = *unitOf(column);
+  const table::Unit& unit = *unitOf(column);
   if (*step == 0.0) {
     return fmt::format(
         "all {} readings of {} are alike: they are rounded to a step that does not show, and "
@@ -123,18 +123,19 @@ std::string wrongWithSessions(const std::vector<double>& session, std::size_t co
 }
 
 /// The column that says of which session a row is: of a kind that heeds it, and where there are several.
-Result<> addSessions(const std::filesystem::path& file, TableColumns& table) {
-  auto loaded = loadColumnIfAny(file, kSession);
-  if (!loaded && !table.kind->shares_places) return {};
-  if (!loaded) return Error{loaded.error().code, loaded.error().message + "; sessions are numbered"};
-  if (!*loaded) return {};
-  std::vector<double>& column = **loaded;
+Result<> addSessions(const table::Table& rows, TableColumns& table) {
+  const auto at = rows.find(kSession);
+  if (!at) return at.error().code == Error::Code::NotFound || !table.kind->shares_places ? Result<>{} : at.error();
+  const bool has_names = rows.columns[*at].kind == table::Kind::Text;
+  auto numbers = has_names ? table::categoryOf(rows, *at).values : rows.numbers(*at);
+  if (!numbers) return table.kind->shares_places ? numbers.error() : Result<>{};
+  std::vector<double> column = *std::move(numbers);
   const auto of_rows = ofFiniteRows(column, table.values);
   const std::size_t count = sharedPlacesOf(of_rows).count;
   const std::string wrong = wrongWithSessions(column, count, of_rows.size());
   if (table.kind->shares_places && !wrong.empty()) {
     return Error{Error::Code::Malformed,
-                 fmt::format("{}: column \"{}\" {}; if it does not number sessions, call it otherwise", file.string(),
+                 fmt::format("{}: column \"{}\" {}; if it does not number sessions, call it otherwise", rows.file.string(),
                              kSession, wrong)};
   }
   const bool is_heeded = table.kind->shares_places && count > 1;
@@ -172,7 +173,7 @@ void addNotes(TableColumns& table) {
   add(noteOnPlaces(table));
   for (std::size_t i = 0; i < table.values.size(); ++i) {
     const char* column = table.kind->columns[i];
-    if (!isOf(Quantity::Length, column)) continue;
+    if (!isOf(table::Quantity::Length, column)) continue;
     add(noteOnSize(column, table.values[i]));
     if (isReading(column)) add(noteOnSteps(column, table.values[i]));
   }
@@ -210,45 +211,78 @@ const TableKind* findTableKind(const std::string& name) {
   return found == tableKinds().end() ? nullptr : &*found;
 }
 
+/// The file's names of the kind's columns. Errors: an unknown kind, no frequency, another number of names.
+static Result<std::vector<std::string>> namesIn(const TableJob& job, const TableKind& kind) {
+  if (kind.needs_frequency && job.frequency_hz.empty()) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{} takes the modulation frequencies: --frequency-mhz", job.kind)};
+  }
+  if (job.columns.empty()) return std::vector<std::string>{kind.columns.begin(), kind.columns.end()};
+  if (job.columns.size() == kind.columns.size()) return job.columns;
+  return Error{Error::Code::InvalidArgument, fmt::format("{} takes {} columns ({}), not {}", job.kind, kind.columns.size(),
+                                                         fmt::join(kind.columns, ", "), job.columns.size())};
+}
+
+/// One column in the unit that is wanted.
+static Result<std::vector<double>> columnIn(const table::Table& rows, ColumnName name, const char* wanted,
+                                            std::vector<std::string>& notes) {
+  const auto at = rows.find(name.in_file);
+  if (at && name.unit.empty()) name.unit = rows.columns[*at].unit;  // of a line of units
+  const bool is_time = at && rows.columns[*at].kind == table::Kind::Time && isOf(table::Quantity::Time, wanted);
+  if (is_time) name.unit = "s";
+  const auto factor = factorOf(name, wanted);
+  if (!factor) return Error{factor.error().code, fmt::format("{}: {}", rows.file.string(), factor.error().message)};
+  if (!at) return at.error();
+  auto values = rows.numbers(*at);
+  if (!values) return values;
+  if (!*factor)
+    notes.push_back(fmt::format("column \"{}\" says no unit and is taken as {}", name.in_file, unitOf(wanted)->name));
+  const double first = is_time ? std::ranges::min(*values, std::ranges::less{}, [](double v) { return std::isnan(v) ? INFINITY : v; }) : 0.0;
+  for (double& one : *values) one = (name.is_negated ? -1.0 : 1.0) * (one - first) * factor->value_or(1.0);
+  return values;
+}
+
+/// Sets what stands for no reading to NaN, in the columns that are used.
+static void setNoReadingsAside(const std::vector<ColumnName>& names, const TableKind& kind, table::Table& rows,
+                               std::vector<std::string>& notes) {
+  std::set<std::size_t> used, readings;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    const auto at = rows.find(names[i].in_file);
+    if (!at) continue;
+    used.insert(*at);
+    if (isReading(kind.columns[i])) readings.insert(*at);
+  }
+  for (std::string& one : table::inWords(table::setSentinelsAside(rows, used, readings))) notes.push_back(std::move(one));
+}
+
 Result<TableColumns> loadTable(const TableJob& job) {
   TableColumns table{.kind = findTableKind(job.kind)};
   if (table.kind == nullptr)
     return Error{Error::Code::InvalidArgument, fmt::format("there is no kind of table \"{}\"", job.kind)};
   const auto& wanted = table.kind->columns;
-  if (table.kind->needs_frequency && job.frequency_hz.empty()) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} takes the modulation frequencies: --frequency-mhz", job.kind)};
-  }
-  std::vector<std::string> names = job.columns;
-  if (names.empty()) names.assign(wanted.begin(), wanted.end());
-  if (names.size() != wanted.size()) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("{} takes {} columns ({}), not {}", job.kind, wanted.size(),
-                             fmt::join(wanted, ", "), names.size())};
-  }
+  const auto given = namesIn(job, *table.kind);
+  if (!given) return given.error();
+  auto rows = table::readTable(job.file);
+  if (!rows) return rows.error();
+  for (std::string& one : table::inWords(rows->aside)) table.notes.push_back(std::move(one));
+  std::vector<ColumnName> names;
+  for (const std::string& name : *given) names.push_back(columnNameOf(name));
+  setNoReadingsAside(names, *table.kind, *rows, table.notes);
   for (std::size_t i = 0; i < names.size(); ++i) {
-    const ColumnName name = columnNameOf(names[i]);
-    const auto factor = factorOf(name, wanted[i]);
-    if (!factor) return ofTable(job, factor.error());
-    auto column = loadColumns(job.file, {name.in_file});
+    auto column = columnIn(*rows, names[i], wanted[i], table.notes);
     if (!column) {
       Error error = column.error();
-      const auto any = loadColumnIfAny(job.file, name.in_file);
-      if (const bool is_missing = any && !*any; is_missing && job.columns.empty())
+      const bool is_missing = error.code == Error::Code::NotFound;
+      if (is_missing && job.columns.empty())
         error.message += fmt::format("; --columns says which of its own stand for {}", fmt::join(wanted, ", "));
       return error;
     }
-    if (!*factor) {
-      table.notes.push_back(fmt::format("column \"{}\" says no unit and is taken as {}", name.in_file,
-                                        unitOf(wanted[i])->name));
-    }
-    for (double& one : column->front()) one *= (name.is_negated ? -1.0 : 1.0) * factor->value_or(1.0);
-    table.values.push_back(std::move(column->front()));
+    table.values.push_back(*std::move(column));
   }
   addNote(table, noteOnRows(table.values));  // of the file, before zeros are none
   for (std::size_t i = 0; i < wanted.size(); ++i)
-    if (isOf(Quantity::Length, wanted[i])) addNote(table, takeZerosAsMissing(wanted[i], table.values[i]));
-  if (auto added = addSessions(job.file, table); !added) return added.error();
+    if (isOf(table::Quantity::Length, wanted[i])) addNote(table, takeZerosAsMissing(wanted[i], table.values[i]));
+  if (auto added = addSessions(*rows, table); !added) return added.error();
   addNotes(table);
   return table;
 }

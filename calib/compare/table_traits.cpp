@@ -72,7 +72,7 @@ void pairRows(NamedTraits& traits, const TableKind& kind) {
 
 Figure figureOf(const NamedTraits& traits, const TableKind& kind) {
   const bool has_two = kind.columns.size() > 1, is_law = std::string_view{kind.name} == "noise_law";
-  const ColumnUnit* unit = unitOf(kind.columns[has_two ? 1 : 0]);
+  const table::Unit* unit = unitOf(kind.columns[has_two ? 1 : 0]);
   auto figure = fittedFigure(traits, kind.name,
                              {.title = kind.tells,
                               .caption = "The tables' rows, and what was fitted to them.",

@@ -2,41 +2,17 @@
 #include "calib/table/column.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <utility>
 
 #include <fmt/format.h>
 
-#include "calib/table/number.h"
 #include "calib/table/records.h"
 #include "calib/table/times.h"
 #include "calib/table/units.h"
 
 namespace toftwin::table {
 namespace {
-
-/// How many fields of a column use which signs.
-struct SignCounts {
-  std::array<std::size_t, 7> count{};
-  std::size_t nothing = 0;
-  [[nodiscard]] std::size_t of(Signs signs) const { return count[static_cast<std::size_t>(signs)]; }
-  [[nodiscard]] std::size_t point() const { return of(Signs::Point) + of(Signs::GroupsOfComma); }
-  [[nodiscard]] std::size_t comma() const { return of(Signs::Comma) + of(Signs::GroupsOfPoint); }
-  [[nodiscard]] std::size_t numbers(std::size_t rows) const { return rows - nothing - of(Signs::NoNumber); }
-};
-
-SignCounts signCounts(const ColumnFields& fields) {
-  SignCounts counts;
-  for (const std::string_view field : fields) {
-    if (saysNothing(field)) {
-      ++counts.nothing;
-    } else {
-      ++counts.count[static_cast<std::size_t>(signsOf(field))];
-    }
-  }
-  return counts;
-}
 
 /// Which sign is the decimal one; why it is not known.
 struct DecimalSign {
@@ -46,18 +22,22 @@ struct DecimalSign {
 };
 
 DecimalSign decimalSignOf(const SignCounts& counts, const DecimalEvidence& others, char delimiter) {
-  const bool has_points = counts.of(Signs::EitherOfPoint) > 0, has_commas = counts.of(Signs::EitherOfComma) > 0;
+  const bool has_points = counts.of(Signs::EitherOfPoint) > 0,
+             has_commas = counts.of(Signs::EitherOfComma) > 0;
   if (counts.point() + counts.comma() > 0) return {.sign = counts.point() >= counts.comma() ? '.' : ','};
-  const bool is_comma_table = others.has_comma && !others.has_point, is_point_table = others.has_point && !others.has_comma;
+  const bool is_comma_table = others.has_comma && !others.has_point,
+             is_point_table = others.has_point && !others.has_comma;
   if (has_points && has_commas) return {.unclear = Signs::EitherOfComma};
   if (has_points) {
     if (!is_comma_table) return {.sign = '.'};
     return {.sign = ',', .note = "its points part thousands, as decimal signs are commas elsewhere"};
   }
   if (!has_commas) return {.sign = is_comma_table ? ',' : '.'};
-  if (is_point_table) return {.sign = '.', .note = "its commas part thousands, as decimal signs are points elsewhere"};
+  if (is_point_table)
+    return {.sign = '.', .note = "its commas part thousands, as decimal signs are points elsewhere"};
   const bool has_whole = counts.of(Signs::Whole) > 0;
-  if (has_whole || (delimiter == ',' && !is_comma_table)) return {.sign = ',', .unclear = Signs::EitherOfComma};
+  if (has_whole || (delimiter == ',' && !is_comma_table))
+    return {.sign = ',', .unclear = Signs::EitherOfComma};
   return {.sign = ','};
 }
 
@@ -73,7 +53,8 @@ std::optional<std::pair<ColumnFields, std::string_view>> withoutUnits(const Colu
     const std::size_t last = field.find_last_of("0123456789");
     if (last == std::string_view::npos) return std::nullopt;
     const std::string_view behind = trimmed(field.substr(last + 1));
-    if (behind.empty() || (!unit.empty() && behind != unit) || findUnit(behind) == nullptr) return std::nullopt;
+    if (behind.empty() || (!unit.empty() && behind != unit) || findUnit(behind) == nullptr)
+      return std::nullopt;
     unit = behind;
     numbers.push_back(field.substr(0, last + 1));
     if (signsOf(numbers.back()) == Signs::NoNumber) return std::nullopt;
@@ -84,14 +65,17 @@ std::optional<std::pair<ColumnFields, std::string_view>> withoutUnits(const Colu
 
 std::string adviceFor(std::string_view field, char decimal_sign, char delimiter) {
   if (signsOf(field) != Signs::NoNumber) {
-    return fmt::format("has another decimal sign than most of its column, '{}': write all numbers alike", decimal_sign);
+    return fmt::format("has another decimal sign than most of its column, '{}': write all numbers alike",
+                       decimal_sign);
   }
   return delimiter == ',' || field.find_first_of("0123456789") == std::string_view::npos
              ? "is not a number: leave the field empty where there is none"
-             : "is not a number: leave the field empty where there is none, and write no marks between thousands";
+             : "is not a number: leave the field empty where there is none, and write no marks between "
+               "thousands";
 }
 
-void readNumbers(const ColumnFields& fields, const DecimalSign& decimal, char delimiter, TableColumn& column) {
+void readNumbers(const ColumnFields& fields, const DecimalSign& decimal, char delimiter,
+                 TableColumn& column) {
   column.kind = Kind::Number, column.decimal_sign = decimal.sign, column.note = decimal.note;
   column.values.reserve(fields.size());
   for (std::size_t row = 0; row < fields.size(); ++row) {
@@ -100,23 +84,36 @@ void readNumbers(const ColumnFields& fields, const DecimalSign& decimal, char de
     column.values.push_back(value.value_or(std::nan("")));
   }
   if (decimal.unclear == Signs::NoNumber) return;
-  const auto at = std::ranges::find_if(fields, [&](std::string_view field) { return signsOf(field) == decimal.unclear; });
+  const auto at =
+      std::ranges::find_if(fields, [&](std::string_view field) { return signsOf(field) == decimal.unclear; });
   column.odd = OddField{static_cast<std::size_t>(at - fields.begin()),
                         "may be a thousand or a fraction; write it without the comma, or all with decimals"};
 }
 
 }  // namespace
 
-DecimalEvidence evidenceIn(const ColumnFields& fields) {
-  const SignCounts counts = signCounts(fields);
-  if (2 * counts.of(Signs::NoNumber) > counts.numbers(fields.size())) return {};
+SignCounts signCounts(const ColumnFields& fields) {
+  SignCounts counts{.rows = fields.size()};
+  for (const std::string_view field : fields) {
+    if (saysNothing(field)) {
+      ++counts.nothing;
+    } else {
+      ++counts.count[static_cast<std::size_t>(signsOf(field))];
+    }
+  }
+  return counts;
+}
+
+DecimalEvidence evidenceIn(const SignCounts& counts) {
+  if (2 * counts.of(Signs::NoNumber) > counts.numbers()) return {};
   return {counts.point() > 0 && counts.point() >= counts.comma(), counts.comma() > counts.point()};
 }
 
-void readColumn(const ColumnFields& fields, const DecimalEvidence& others, char delimiter, TableColumn& column) {
-  constexpr std::size_t kNumbersPerText = 4;  // a column of numbers with more texts than one in five holds names
-  const SignCounts counts = signCounts(fields);
-  const std::size_t texts = counts.of(Signs::NoNumber), numbers = counts.numbers(fields.size());
+void readColumn(const ColumnFields& fields, const SignCounts& counts, const DecimalEvidence& others,
+                char delimiter, TableColumn& column) {
+  constexpr std::size_t kNumbersPerText =
+      4;  // a column of numbers with more texts than one in five holds names
+  const std::size_t texts = counts.of(Signs::NoNumber), numbers = counts.numbers();
   if (texts == 0 || numbers >= kNumbersPerText * texts) {
     readNumbers(fields, decimalSignOf(counts, others, delimiter), delimiter, column);
     return;

@@ -37,7 +37,8 @@ bool isOf(const TableColumn& column, Quantity quantity) {
 
 bool isCalledTime(const TableColumn& column) {
   const bool has_other_unit = !column.unit.empty() && !isOf(column, Quantity::Time);
-  return says(column.stem, Meaning::Time) && !says(column.stem, Meaning::NoTime) && !has_other_unit;
+  // "data" is a date in Italian only.
+  return strengthOf(column.stem, Meaning::Time) > 1 && !says(column.stem, Meaning::NoTime) && !has_other_unit;
 }
 
 Nature natureOf(const TableColumn& column) {
@@ -45,8 +46,10 @@ Nature natureOf(const TableColumn& column) {
   if (column.kind == Kind::Time || isCalledTime(column)) return Nature::Time;
   const bool is_count = column.unit.empty() || isOf(column, Quantity::Pixels);
   if (is_count && says(column.stem, Meaning::Pixel) && areWhole(column.values)) return Nature::Index;
-  if (isOf(column, Quantity::Length) || (column.unit.empty() && says(column.stem, Meaning::Length))) return Nature::Length;
-  if (isOf(column, Quantity::Angle) || (column.unit.empty() && says(column.stem, Meaning::Angle))) return Nature::Angle;
+  if (isOf(column, Quantity::Length) || (column.unit.empty() && says(column.stem, Meaning::Length)))
+    return Nature::Length;
+  if (isOf(column, Quantity::Angle) || (column.unit.empty() && says(column.stem, Meaning::Angle)))
+    return Nature::Angle;
   return is_count && says(column.stem, Meaning::Index) ? Nature::Index : Nature::Number;
 }
 
@@ -101,7 +104,7 @@ void makeTime(const TableColumn& from, Column& column, std::vector<std::string>&
     return;
   }
   const bool is_said = isOf(from, Quantity::Time);
-  const auto epoch = epochOf(from.values, !is_said && strengthOf(from.stem, Meaning::Time) > 1);
+  const auto epoch = epochOf(from.values, !is_said);
   if (epoch && (!is_said || epoch->seconds_per_unit == findUnit(from.unit)->in_base)) {
     for (double& value : column.values) value = epoch->offset_s + epoch->seconds_per_unit * value;
     column.unit = "s";
@@ -113,9 +116,10 @@ void makeTime(const TableColumn& from, Column& column, std::vector<std::string>&
 }
 
 Error noTime(const Table& table, std::size_t column) {
-  return table.errorAt(column, table.firstTextIn(column),
-                       "is not read as a time, as its header says. Write 2026-05-01T10:15:30+02:00, 10:15:30 or seconds; or "
-                       "say in a map what it is: ignore = [\"…\"], or nature = \"category\" (docs/tables.md)");
+  return table.errorAt(
+      column, table.firstTextIn(column),
+      "is not read as a time, as its header says. Write 2026-05-01T10:15:30+02:00, 10:15:30 or seconds; or "
+      "say in a map what it is: ignore = [\"…\"], or nature = \"category\" (docs/tables.md)");
 }
 
 }  // namespace
@@ -140,8 +144,7 @@ Result<Column> covariateOf(const Table& table, std::size_t at, MapNature said, b
                            std::vector<std::string>& notes) {
   const TableColumn& from = table.columns[at];
   const Nature nature = is_group ? Nature::Category : natureSaid(from, said);
-  const bool must_be_time = said == MapNature::Time || (said == MapNature::Guessed && isCalledTime(from) &&
-                                                        strengthOf(from.stem, Meaning::Time) > 1);
+  const bool must_be_time = said == MapNature::Time || (said == MapNature::Guessed && isCalledTime(from));
   if (!is_group && from.kind == Kind::Text && must_be_time) return noTime(table, at);
   if (nature == Nature::Category) return categoryOf(table, at);
   auto values = table.numbers(at);

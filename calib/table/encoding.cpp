@@ -60,7 +60,8 @@ void appendUtf8(std::string& out, std::uint32_t point) {
   }
 }
 
-/// Windows-1252, as WHATWG's Encoding Standard has it: the five bytes that mean nothing are the controls of Latin-1.
+/// Windows-1252, as WHATWG's Encoding Standard has it: the five bytes that mean nothing are the controls of
+/// Latin-1.
 std::string fromWindows1252(std::string_view text) {
   constexpr std::array<std::uint32_t, 32> kHigh{
       0x20AC, 0x81,   0x201A, 0x0192, 0x201E, 0x2026, 0x2020, 0x2021, 0x02C6, 0x2030, 0x0160,
@@ -104,7 +105,8 @@ Zeros zerosIn(std::string_view bytes) {
   const std::size_t looked = std::min(bytes.size(), kLooked);
   for (std::size_t i = 0; i < looked; ++i)
     if (bytes[i] == '\0') ++count[i % 2];
-  if (count[0] + count[1] == 0) return bytes.find('\0') == std::string_view::npos ? Zeros::None : Zeros::Elsewhere;
+  if (count[0] + count[1] == 0)
+    return bytes.find('\0') == std::string_view::npos ? Zeros::None : Zeros::Elsewhere;
   if (count[0] == 0 && count[1] * 4 > looked) return Zeros::OddBytes;
   if (count[1] == 0 && count[0] * 4 > looked) return Zeros::EvenBytes;
   return Zeros::Elsewhere;
@@ -112,7 +114,8 @@ Zeros zerosIn(std::string_view bytes) {
 
 Result<DecodedText> decodedUtf16(std::string_view bytes, bool is_big_endian) {
   DecodedText decoded{fromUtf16(bytes, is_big_endian), "the file is UTF-16"};
-  if (decoded.text.find('\0') != std::string::npos) return noText("holds zero characters: this is no text table");
+  if (decoded.text.find('\0') != std::string::npos)
+    return noText("holds zero characters: this is no text table");
   return decoded;
 }
 

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "calib/table/column_names.h"
 #include "calib/table/number.h"
 #include "calib/table/stamp.h"
 #include "calib/table/sums.h"
@@ -20,8 +21,6 @@ namespace {
 
 using Fields = std::span<const std::string_view>;
 
-constexpr std::size_t kSampled = 300;
-
 /// Trailing fields that hold something.
 std::size_t countFilled(Fields fields) {
   std::size_t count = fields.size();
@@ -30,22 +29,11 @@ std::size_t countFilled(Fields fields) {
 }
 
 bool isText(Look look) { return look == Look::Text; }
-bool isValue(Look look) { return look == Look::Number || look == Look::Time; }
-
-/// The number of fields that most of the first records have, of those with the most of them.
-std::size_t commonWidth(const Records& records) {
-  std::map<std::size_t, std::size_t> counts;
-  for (std::size_t i = 0; i < std::min(records.size(), kSampled); ++i) ++counts[records.at(i).size()];
-  std::size_t width = 0, most = 0;
-  for (const auto& [fields, count] : counts)
-    if (count >= most) width = fields, most = count;
-  return width;
-}
 
 /// Which columns hold numbers or times in most of the first records of that width.
 std::vector<bool> valueColumns(const Records& records, std::size_t width) {
   std::vector<std::size_t> values(width), texts(width);
-  for (std::size_t i = 0; i < std::min(records.size(), kSampled); ++i) {
+  for (std::size_t i = 0; i < std::min(records.size(), kSampledRecords); ++i) {
     const Fields fields = records.at(i);
     if (fields.size() != width) continue;
     for (std::size_t c = 0; c < width; ++c) {
@@ -80,7 +68,8 @@ bool areUnits(Fields fields) {
   for (std::string_view field : fields) {
     if (field.empty() || field == "-") continue;
     if (lookOf(field) != Look::Text) return false;
-    if (field.size() > 2 && (field.front() == '[' || field.front() == '(')) field = trimmed(field.substr(1, field.size() - 2));
+    if (field.size() > 2 && (field.front() == '[' || field.front() == '('))
+      field = trimmed(field.substr(1, field.size() - 2));
     (findUnit(field) != nullptr ? known : others) += 1;
   }
   return known > 0 && known >= others;
@@ -90,46 +79,20 @@ std::string otherWidth(std::size_t fields, std::size_t header, char delimiter) {
   std::string words = fmt::format("has {}, but the header has {}", counted(fields, "field"), header);
   if (fields > header && delimiter == ',') {
     words +=
-        "; commas in its numbers may be why, decimal ones or between thousands: write 1500.25 for 1500,25 and for "
+        "; commas in its numbers may be why, decimal ones or between thousands: write 1500.25 for 1500,25 "
+        "and for "
         "1,500.25, and quote texts that hold commas";
   }
   return words;
 }
 
-/// Fields of a comment as names of so many columns, at whichever delimiter parts it so.
-std::vector<std::string> namesInComment(std::string_view comment, std::size_t width, char delimiter) {
-  for (const char one : {delimiter, ',', ';', '\t', '|', kBlanks}) {
-    const Records parts = splitRecords(comment, one);
-    if (parts.size() != 1 || parts.at(0).size() != width) continue;
-    const bool are_names = std::ranges::all_of(parts.at(0), [](std::string_view field) {
-      return lookOf(field) == Look::Text || lookOf(field) == Look::Nothing;
-    });
-    const bool has_name = std::ranges::any_of(parts.at(0), [](std::string_view field) { return !field.empty(); });
-    if (are_names && has_name) return {parts.at(0).begin(), parts.at(0).end()};
-  }
-  return {};
-}
-
-/// Words parted by two blanks or more, as lines of names over columns of a fixed width.
-std::vector<std::string> namesAtWideGaps(Fields fields, std::size_t width) {
-  if (fields.size() <= width || width == 0) return {};
-  const char* begin = fields.front().data();
-  const char* end = fields.back().data() + fields.back().size();
-  if (end < begin) return {};
-  std::string_view line{begin, static_cast<std::size_t>(end - begin)};
-  std::vector<std::string> names;
-  while (!line.empty()) {
-    const std::size_t gap = std::min(line.find("  "), line.size());
-    names.emplace_back(trimmed(line.substr(0, gap)));
-    line = trimmed(line.substr(gap));
-  }
-  return names.size() == width ? names : std::vector<std::string>{};
-}
-
 class Finder {
  public:
   Finder(const Records& records, char delimiter, const std::filesystem::path& name)
-      : records_(records), delimiter_(delimiter), name_(name), width_(commonWidth(records)),
+      : records_(records),
+        delimiter_(delimiter),
+        name_(name),
+        width_(commonWidth(records)),
         are_values_(valueColumns(records, width_)) {}
 
   Result<Layout> find() {
@@ -159,9 +122,11 @@ class Finder {
     if (first_row_ == records_.size()) first_row_ = std::min<std::size_t>(1, records_.size());
     for (std::size_t i = first_row_; i-- > 0;) {
       const LineKind kind = kindOf(records_.at(i), are_values_);
-      const bool is_names = kind == LineKind::Names || (kind == LineKind::OtherWidth && i + 1 == first_row_ && namesFit(i));
+      const bool is_names =
+          kind == LineKind::Names || (kind == LineKind::OtherWidth && i + 1 == first_row_ && namesFit(i));
       if (!is_names) continue;
-      if (i > 0 && areUnits(records_.at(i)) && kindOf(records_.at(i - 1), are_values_) == LineKind::Names) continue;
+      if (i > 0 && areUnits(records_.at(i)) && kindOf(records_.at(i - 1), are_values_) == LineKind::Names)
+        continue;
       names_ = i;
       return;
     }
@@ -212,7 +177,7 @@ class Finder {
     const bool ends_empty = everyRow([&](Fields row) { return row.back().empty(); });
     if (fields.size() + 1 == width_ && ends_empty) {
       layout_.header.emplace_back();
-    } else if (fields.size() + 1 == width_ && counts()) {
+    } else if (fields.size() + 1 == width_ && delimiter_ != ',' && counts()) {
       layout_.header.insert(layout_.header.begin(), "");
     } else if (fields.size() == width_ + 1 && fields.back().empty()) {
       layout_.header.pop_back();
@@ -226,15 +191,18 @@ class Finder {
       if (records_.at(i).size() == width_ && !holds(records_.at(i))) return false;
     return first_row_ < records_.size();
   }
-  /// Whether the first column counts the rows from 0 or 1, as R writes without a name.
+  /// Whether the first column counts the rows from 0 or 1, as R writes without a name. Between commas decimal
+  /// commas would look like this, too.
   [[nodiscard]] bool counts() const {
+    constexpr std::size_t kFewestRows = 3;
     std::optional<double> before;
-    return everyRow([&](Fields row) {
-      const auto number = numberIn(row.front(), '.');
-      const bool is_next = number && (before ? *number == *before + 1.0 : *number == 0.0 || *number == 1.0);
-      before = number;
-      return is_next;
-    });
+    return records_.size() >= first_row_ + kFewestRows && everyRow([&](Fields row) {
+             const auto number = numberIn(row.front(), '.');
+             const bool is_next =
+                 number && (before ? *number == *before + 1.0 : *number == 0.0 || *number == 1.0);
+             before = number;
+             return is_next;
+           });
   }
 
   void takeUnits() {
@@ -243,7 +211,8 @@ class Finder {
       if (!areUnits(records_.at(i)) || records_.at(i).size() != width_) continue;
       for (const std::string_view field : records_.at(i)) {
         std::string_view unit = field == "-" ? std::string_view{} : field;
-        if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '(')) unit = unit.substr(1, unit.size() - 2);
+        if (unit.size() > 2 && (unit.front() == '[' || unit.front() == '('))
+          unit = unit.substr(1, unit.size() - 2);
         layout_.units.emplace_back(trimmed(unit));
       }
       units_ = i;
@@ -262,8 +231,8 @@ class Finder {
       } else if (fields.size() == width || (fields.size() > width && countFilled(fields) <= width)) {
         layout_.rows.push_back(i);
       } else if (isFooter(i)) {
-        layout_.notes.push_back(
-            fmt::format("line {} and what follows is below the table: \"{}\"", records_.line[i], fields.front().substr(0, 40)));
+        layout_.notes.push_back(fmt::format("line {} and what follows is below the table: \"{}\"",
+                                            records_.line[i], fields.front().substr(0, 40)));
         break;
       } else {
         return malformedAt(name_, records_.line[i], otherWidth(fields.size(), width, delimiter_));
@@ -292,7 +261,9 @@ class Finder {
   void noteWhatIsAbove() {
     const std::size_t above = names_ ? *names_ : firstOfWidth();
     if (above == 0 || above >= records_.size()) return;
-    layout_.notes.insert(layout_.notes.begin(), fmt::format("{} above the table {} not used", counted(above, "line"), above == 1 ? "is" : "are"));
+    layout_.notes.insert(
+        layout_.notes.begin(),
+        fmt::format("{} above the table {} not used", counted(above, "line"), above == 1 ? "is" : "are"));
   }
 
   const Records& records_;
@@ -305,35 +276,16 @@ class Finder {
   Layout layout_{};
 };
 
-/// How well a delimiter parts the text: the share of records of the same width, times what its fields look like.
-double scoreOf(std::string_view text, char delimiter) {
-  const Records records = splitRecords(text, delimiter, 1, kSampled);
-  if (records.size() == 0) return 0.0;
-  const std::size_t width = commonWidth(records);
-  constexpr double kOfNothing = 0.5, kOfText = 0.4, kOfTextWithOthers = 0.05;
-  double looks = 0.0, fields = 0.0, alike = 0.0;
-  for (std::size_t i = 0; i < records.size(); ++i) {
-    if (records.at(i).size() != width) continue;
-    alike += 1.0;
-    for (const std::string_view field : records.at(i)) {
-      const Look look = lookOf(field);
-      const bool has_others = field.find_first_of(",;\t|") != std::string_view::npos;
-      looks += isValue(look) ? 1.0 : look == Look::Nothing ? kOfNothing : has_others ? kOfTextWithOthers : kOfText;
-      fields += 1.0;
-    }
-  }
-  const auto n = static_cast<double>(records.size());
-  const auto layout = layoutOf(records, delimiter, {});
-  const bool is_named = layout && layout->header_line && layout->header.size() == width;
-  const double share = alike / n, of_width = width > 1 ? 1.0 : 0.5, of_names = is_named ? 1.0 : 0.4;
-  // A name that holds another delimiter was not parted.
-  const bool holds_others = is_named && std::ranges::any_of(layout->header, [&](const std::string& one) {
-    return one.find_first_of(";\t|") != std::string::npos || (width == 1 && one.find(',') != std::string::npos);
-  });
-  return share * share * (looks / std::max(fields, 1.0)) * of_width * of_names * (holds_others ? 0.3 : 1.0);
-}
-
 }  // namespace
+
+std::size_t commonWidth(const Records& records) {
+  std::map<std::size_t, std::size_t> counts;
+  for (std::size_t i = 0; i < std::min(records.size(), kSampledRecords); ++i) ++counts[records.at(i).size()];
+  std::size_t width = 0, most = 0;
+  for (const auto& [fields, count] : counts)
+    if (count >= most) width = fields, most = count;
+  return width;
+}
 
 Error malformedAt(const std::filesystem::path& name, std::size_t line, std::string_view what) {
   return {Error::Code::Malformed, fmt::format("{}:{}: {}", name.string(), line, what)};
@@ -349,28 +301,6 @@ Look lookOf(std::string_view field) {
 
 Result<Layout> layoutOf(const Records& records, char delimiter, const std::filesystem::path& name) {
   return Finder{records, delimiter, name}.find();
-}
-
-std::optional<SaidDelimiter> saidDelimiter(std::string_view text) {
-  const std::size_t end = std::min(text.find_first_of("\r\n"), text.size());
-  std::string_view line = text.substr(0, end);
-  if (line.size() > 2 && line.front() == '"' && line.back() == '"') line = line.substr(1, line.size() - 2);
-  if (line.size() < 5 || !(line.starts_with("sep=") || line.starts_with("SEP="))) return std::nullopt;
-  const char delimiter = line[4];
-  if (std::string_view{",;\t| "}.find(delimiter) == std::string_view::npos) return std::nullopt;
-  if (!std::ranges::all_of(line.substr(5), [=](char c) { return c == delimiter || c == ' '; })) return std::nullopt;
-  return SaidDelimiter{delimiter, end};
-}
-
-char likeliestDelimiter(std::string_view text) {
-  char best = ',';
-  double highest = 0.0;
-  for (const char delimiter : {',', ';', '\t', '|', kBlanks, kNoDelimiter}) {
-    if (delimiter != kNoDelimiter && text.find(delimiter) == std::string_view::npos) continue;
-    const double score = scoreOf(text, delimiter);
-    if (score > highest) best = delimiter, highest = score;
-  }
-  return best;
 }
 
 }  // namespace toftwin::table

@@ -11,7 +11,8 @@ namespace {
 
 double quantileOf(std::vector<double> values, double share) {
   if (values.empty()) return 0.0;
-  const auto at = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
   std::ranges::nth_element(values, at);
   return *at;
 }
@@ -46,7 +47,8 @@ double correlation(const std::vector<double>& a, const std::vector<double>& b) {
   return aa > 0.0 && bb > 0.0 ? ab / std::sqrt(aa * bb) : 0.0;
 }
 
-/// Siegel, Biometrika 69 (1982): the median over all points of the median slope to the others. Half of them may be odd.
+/// Siegel, Biometrika 69 (1982): the median over all points of the median slope to the others. Half of them
+/// may be odd.
 double repeatedMedian(const std::vector<double>& x, const std::vector<double>& y) {
   std::vector<double> of_points, slopes;
   for (std::size_t i = 0; i < x.size(); ++i) {
@@ -63,14 +65,15 @@ double repeatedMedian(const std::vector<double>& x, const std::vector<double>& y
 LineFit lineThrough(const std::vector<double>& x, const std::vector<double>& y) {
   constexpr std::size_t kMost = 400;
   std::vector<double> a, b;
-  for (std::size_t i = 0; i < x.size(); ++i)
+  for (std::size_t i = 0; i < std::min(x.size(), y.size()); ++i)  // texts have no values
     if (std::isfinite(x[i]) && std::isfinite(y[i])) a.push_back(x[i]), b.push_back(y[i]);
   LineFit fit{.pairs = a.size()};
   if (a.size() < 3) return fit;
   const std::size_t rows = std::min(a.size(), kMost), all = a.size();
   for (std::size_t i = 0; i < rows; ++i) a[i] = a[i * all / rows], b[i] = b[i * all / rows];
   a.resize(rows), b.resize(rows);
-  fit.spread_x = quantileOf(a, 0.9) - quantileOf(a, 0.1), fit.spread_y = quantileOf(b, 0.9) - quantileOf(b, 0.1);
+  fit.spread_x = quantileOf(a, 0.9) - quantileOf(a, 0.1),
+  fit.spread_y = quantileOf(b, 0.9) - quantileOf(b, 0.1);
   fit.rank = correlation(ranksOf(a), ranksOf(b));
   fit.slope = repeatedMedian(a, b);
   std::vector<double> left(rows);

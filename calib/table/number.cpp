@@ -24,12 +24,12 @@ std::string_view withoutAccent(std::uint32_t point) {
     std::string_view letters;
   };
   constexpr std::array kRanges{
-      Range{0xC0, 0xC5, "a"}, Range{0xC6, 0xC6, "ae"}, Range{0xC7, 0xC7, "c"},   Range{0xC8, 0xCB, "e"},
-      Range{0xCC, 0xCF, "i"}, Range{0xD1, 0xD1, "n"},  Range{0xD2, 0xD6, "o"},   Range{0xD8, 0xD8, "o"},
-      Range{0xD9, 0xDC, "u"}, Range{0xDD, 0xDD, "y"},  Range{0xDF, 0xDF, "ss"},  Range{0xE0, 0xE5, "a"},
-      Range{0xE6, 0xE6, "ae"}, Range{0xE7, 0xE7, "c"}, Range{0xE8, 0xEB, "e"},   Range{0xEC, 0xEF, "i"},
-      Range{0xF1, 0xF1, "n"}, Range{0xF2, 0xF6, "o"},  Range{0xF8, 0xF8, "o"},   Range{0xF9, 0xFC, "u"},
-      Range{0xFD, 0xFD, "y"}, Range{0xFF, 0xFF, "y"},  Range{0x152, 0x153, "oe"}};
+      Range{0xC0, 0xC5, "a"},  Range{0xC6, 0xC6, "ae"}, Range{0xC7, 0xC7, "c"},   Range{0xC8, 0xCB, "e"},
+      Range{0xCC, 0xCF, "i"},  Range{0xD1, 0xD1, "n"},  Range{0xD2, 0xD6, "o"},   Range{0xD8, 0xD8, "o"},
+      Range{0xD9, 0xDC, "u"},  Range{0xDD, 0xDD, "y"},  Range{0xDF, 0xDF, "ss"},  Range{0xE0, 0xE5, "a"},
+      Range{0xE6, 0xE6, "ae"}, Range{0xE7, 0xE7, "c"},  Range{0xE8, 0xEB, "e"},   Range{0xEC, 0xEF, "i"},
+      Range{0xF1, 0xF1, "n"},  Range{0xF2, 0xF6, "o"},  Range{0xF8, 0xF8, "o"},   Range{0xF9, 0xFC, "u"},
+      Range{0xFD, 0xFD, "y"},  Range{0xFF, 0xFF, "y"},  Range{0x152, 0x153, "oe"}};
   for (const Range& one : kRanges)
     if (point >= one.first && point <= one.last) return one.letters;
   return {};
@@ -101,7 +101,9 @@ bool areGroups(const Parts& parts, char mark, std::size_t end) {
     if (isDigit(parts.mantissa[i])) {
       ++digits;
     } else {
-      if (parts.mantissa[i] != mark || parts.mantissa[0] == '0' || digits == 0 || digits > 3 || (!is_first && digits != 3)) return false;
+      if (parts.mantissa[i] != mark || parts.mantissa[0] == '0' || digits == 0 || digits > 3 ||
+          (!is_first && digits != 3))
+        return false;
       is_first = false, digits = 0;
     }
   }
@@ -134,8 +136,9 @@ std::string folded(std::string_view text) {
   for (std::size_t i = 0; i < text.size(); ++i) {
     const auto byte = static_cast<unsigned char>(text[i]);
     const bool is_pair = byte >= 0xC3 && byte <= 0xC5 && i + 1 < text.size();
-    const auto letters = is_pair ? withoutAccent((byte & 0x1FU) << 6U | (static_cast<unsigned char>(text[i + 1]) & 0x3FU))
-                                 : std::string_view{};
+    const auto letters =
+        is_pair ? withoutAccent((byte & 0x1FU) << 6U | (static_cast<unsigned char>(text[i + 1]) & 0x3FU))
+                : std::string_view{};
     if (!letters.empty()) {
       out += letters, ++i;
     } else {
@@ -148,13 +151,15 @@ std::string folded(std::string_view text) {
 bool isSpreadsheetError(std::string_view field) {
   constexpr std::size_t kLongest = 14;
   if (field.size() < 3 || field.size() > kLongest || field.front() != '#') return false;
-  const bool is_shouted = (field[1] >= 'A' && field[1] <= 'Z') || field[1] == '\xC2';  // "#¡DIV/0!" in Spanish
+  const bool is_shouted =
+      (field[1] >= 'A' && field[1] <= 'Z') || field[1] == '\xC2';  // "#¡DIV/0!" in Spanish
   if (field.back() == '!' || field.back() == '?') return is_shouted;
   return isOneOf(folded(field), {"#n/a", "#na", "#nv", "#n/d", "#nd"});
 }
 
 bool saysNothingAmongNames(std::string_view field) {
-  return field.empty() || isSpreadsheetError(field) || isOneOf(folded(field), {"nan", "na", "n/a", "<na>", "null", "\\n"});
+  return field.empty() || isSpreadsheetError(field) ||
+         isOneOf(folded(field), {"nan", "na", "n/a", "<na>", "null", "\\n"});
 }
 
 bool saysNothing(std::string_view field) {
@@ -165,11 +170,13 @@ bool saysNothing(std::string_view field) {
   if (saysNothingAmongNames(field)) return true;
   if (field.find_first_not_of("-*?._") == std::string_view::npos) return true;
   return isOneOf(folded(field),
-                 {"-nan", "+nan", "nan(ind)", "-nan(ind)", "1.#qnan", "-1.#ind", "1.#ind", "1.#inf", "-1.#inf",
-                  "inf", "+inf", "-inf", "infinity", "-infinity", "none", "nil", "nat", "n.a.", "n. a.", "n.d.", "nd",
-                  "k.a.", "k. a.", "(null)", "missing", "invalid", "leer", "fehlt", "ungultig", "ol", "o.l", "overload",
-                  "overflow", "over", "out of range", "no data", "no reading", "\xE2\x80\x93", "\xE2\x80\x94",
-                  "\xE2\x88\x9E", "-\xE2\x88\x9E"});
+                 {"-nan",       "+nan",         "nan(ind)",     "-nan(ind)",    "1.#qnan",      "-1.#ind",
+                  "1.#ind",     "1.#inf",       "-1.#inf",      "inf",          "+inf",         "-inf",
+                  "infinity",   "-infinity",    "none",         "nil",          "nat",          "n.a.",
+                  "n. a.",      "n.d.",         "nd",           "k.a.",         "k. a.",        "(null)",
+                  "missing",    "invalid",      "leer",         "fehlt",        "ungultig",     "ol",
+                  "o.l",        "overload",     "overflow",     "over",         "out of range", "no data",
+                  "no reading", "\xE2\x80\x93", "\xE2\x80\x94", "\xE2\x88\x9E", "-\xE2\x88\x9E"});
 }
 
 Signs signsOf(std::string_view field) {
@@ -181,10 +188,12 @@ Signs signsOf(std::string_view field) {
     const bool has_mark = text.find('\'') != std::string_view::npos;
     return has_mark && !areGroups(parts, '\'', text.size()) ? Signs::NoNumber : Signs::Whole;
   }
-  if (points == 0 || commas == 0) return signsOfOneKind(parts, points > 0 ? '.' : ',', std::max(points, commas));
+  if (points == 0 || commas == 0)
+    return signsOfOneKind(parts, points > 0 ? '.' : ',', std::max(points, commas));
   const bool ends_in_point = text.rfind('.') > text.rfind(',');
   const char decimal = ends_in_point ? '.' : ',', group = ends_in_point ? ',' : '.';
-  if (std::ranges::count(text, decimal) != 1 || !areGroups(parts, group, text.find(decimal))) return Signs::NoNumber;
+  if (std::ranges::count(text, decimal) != 1 || !areGroups(parts, group, text.find(decimal)))
+    return Signs::NoNumber;
   return ends_in_point ? Signs::Point : Signs::Comma;
 }
 
@@ -209,10 +218,12 @@ std::optional<double> numberIn(std::string_view field, char decimal_sign) {
     if (i == decimal) plain += '.';
     if (i > decimal && !isDigit(text[i])) return std::nullopt;
   }
-  if (!parts.exponent.empty()) plain += "e" + std::string{parts.exponent.substr(parts.exponent.front() == '+' ? 1 : 0)};
+  if (!parts.exponent.empty())
+    plain += "e" + std::string{parts.exponent.substr(parts.exponent.front() == '+' ? 1 : 0)};
   const auto [last, failed] = std::from_chars(plain.data(), plain.data() + plain.size(), value);
   if (failed == std::errc::result_out_of_range) return std::nan("");
-  return failed == std::errc{} && last == plain.data() + plain.size() ? std::optional{checked()} : std::nullopt;
+  return failed == std::errc{} && last == plain.data() + plain.size() ? std::optional{checked()}
+                                                                      : std::nullopt;
 }
 
 int decimalsOf(std::string_view field, char decimal_sign) {
@@ -228,9 +239,11 @@ int decimalsOf(std::string_view field, char decimal_sign) {
 
 std::optional<bool> flagIn(std::string_view field) {
   const std::string word = folded(field);
-  if (isOneOf(word, {"1", "yes", "y", "true", "t", "x", "ja", "j", "wahr", "oui", "o", "vrai", "si", "s", "vero", "verdadero"}))
+  if (isOneOf(word, {"1", "yes", "y", "true", "t", "x", "ja", "j", "wahr", "oui", "o", "vrai", "si", "s",
+                     "vero", "verdadero"}))
     return true;
-  if (isOneOf(word, {"0", "no", "n", "false", "f", "nein", "falsch", "non", "faux", "falso"}) || saysNothing(field))
+  if (isOneOf(word, {"0", "no", "n", "false", "f", "nein", "falsch", "non", "faux", "falso"}) ||
+      saysNothing(field))
     return false;
   const auto number = numberIn(field, word.find(',') == std::string::npos ? '.' : ',');
   if (number == 1.0) return true;

@@ -22,9 +22,11 @@ namespace {
 /// Errors: no line names the columns, two have the same name, one has none.
 Result<> checkHeader(const Table& table) {
   const auto refuse = [&](const std::string& what) {
-    return Error{Error::Code::Malformed, fmt::format("{}:{}: {}", table.file.string(), table.line.front(), what)};
+    return Error{Error::Code::Malformed,
+                 fmt::format("{}:{}: {}", table.file.string(), table.line.front(), what)};
   };
-  if (!table.has_header) return refuse("no line above it names the columns: begin the file with one, as time_s,depth_mm");
+  if (!table.has_header)
+    return refuse("no line above it names the columns: begin the file with one, as time_s,depth_mm");
   if (table.columns.size() == 1) {
     return refuse(fmt::format("no comma, semicolon, tab or blank parts \"{}\" into columns",
                               table.columns.front().header.substr(0, 60)));
@@ -33,7 +35,8 @@ Result<> checkHeader(const Table& table) {
   for (std::size_t c = 0; c < table.columns.size(); ++c) {
     const std::string& header = table.columns[c].header;
     if (header.empty()) return refuse(fmt::format("column {} has no header: name it", c + 1));
-    if (!seen.insert(header).second) return refuse(fmt::format("two columns are called \"{}\": rename one", header));
+    if (!seen.insert(header).second)
+      return refuse(fmt::format("two columns are called \"{}\": rename one", header));
   }
   return {};
 }
@@ -48,7 +51,12 @@ class Reader {
     if (!roles) return roles.error();
     roles_ = *std::move(roles);
     out_.file = table_.file, out_.line = table_.line, out_.aside = table_.aside;
-    for (SetAside& one : setSentinelsAside(table_)) out_.aside.push_back(std::move(one));
+    std::set<std::size_t> readings, screened;
+    for (const auto& role : {roles_.measured, roles_.error})
+      if (role) readings.insert(*role);
+    for (std::size_t c = 0; c < table_.columns.size(); ++c)
+      if (c != roles_.session && c != roles_.capture && c != roles_.locked) screened.insert(c);
+    for (SetAside& one : setSentinelsAside(table_, screened, readings)) out_.aside.push_back(std::move(one));
     std::vector<std::string> found;
     if (auto done = findReference(table_, map_, roles_, found); !done) return done.error();
     takeFinerGroup();
@@ -63,8 +71,8 @@ class Reader {
  private:
   [[nodiscard]] const std::string& nameOf(std::size_t column) const { return table_.columns[column].header; }
 
-  /// What values of a column are multiplied with to be in the unit of the errors; a column without a unit of its own is
-  /// in that of the other.
+  /// What values of a column are multiplied with to be in the unit of the errors; a column without a unit of
+  /// its own is in that of the other.
   double factorOf(std::size_t column, std::optional<std::size_t> other) {
     const TableColumn& one = table_.columns[column];
     const double own = millimetresIn(one), others = other ? millimetresIn(table_.columns[*other]) : 0.0;
@@ -81,7 +89,8 @@ class Reader {
     if (values)
       for (double& value : *values) value *= factor;
     const TableColumn& one = table_.columns[column];
-    if (values && !one.note.empty()) out_.notes.push_back(fmt::format("column \"{}\": {}", one.header, one.note));
+    if (values && !one.note.empty())
+      out_.notes.push_back(fmt::format("column \"{}\": {}", one.header, one.note));
     return values;
   }
 
@@ -124,14 +133,15 @@ class Reader {
     return {};
   }
 
-  /// A column that could name sessions, beside one that does, and that names at least two groups in each on average: rows
-  /// of such a run may err alike.
+  /// A column that could name sessions, beside one that does, and that names at least two groups in each on
+  /// average: rows of such a run may err alike.
   void takeFinerGroup() {
     if (!roles_.session || roles_.capture || !map_.covariates.empty()) return;
     const Column session = categoryOf(table_, *roles_.session);
     for (const auto& [column, nature] : roles_.covariates) {
       const TableColumn& one = table_.columns[column];
-      if (!saysOnly(one.stem, Meaning::Session) || !one.unit.empty() || nature != MapNature::Guessed) continue;
+      if (!saysOnly(one.stem, Meaning::Session) || !one.unit.empty() || nature != MapNature::Guessed)
+        continue;
       const Column runs = categoryOf(table_, column);
       std::set<std::pair<double, double>> groups;
       for (std::size_t i = 0; i < table_.rows(); ++i) groups.emplace(session.values[i], runs.values[i]);
@@ -143,7 +153,8 @@ class Reader {
   }
 
   Result<> readCovariates() {
-    for (const auto& [role, name] : {std::pair{roles_.session, &out_.session_name}, {roles_.capture, &out_.capture_name}}) {
+    for (const auto& [role, name] :
+         {std::pair{roles_.session, &out_.session_name}, {roles_.capture, &out_.capture_name}}) {
       if (!role) continue;
       out_.covariates.push_back(categoryOf(table_, *role));
       *name = nameOf(*role);
@@ -163,8 +174,9 @@ class Reader {
     if (is_empty) {
       out_.notes.push_back(fmt::format("column \"{}\" is empty", column.header));
     } else if (are_remarks) {
-      out_.notes.push_back(fmt::format("column \"{}\" holds {} different texts in {} rows: it names no groups and is not used",
-                                       column.header, column.words.size(), table_.rows()));
+      out_.notes.push_back(
+          fmt::format("column \"{}\" holds {} different texts in {} rows: it names no groups and is not used",
+                      column.header, column.words.size(), table_.rows()));
     }
     return is_empty || are_remarks;
   }
@@ -173,7 +185,8 @@ class Reader {
     std::vector<std::string> notes{inWords(table_, roles_)};
     notes.insert(notes.end(), found.begin(), found.end());
     if (!roles_.error && !roles_.reference)
-      notes.emplace_back("no reference: only changes of the measured value are seen, not whether it is right");
+      notes.emplace_back(
+          "no reference: only changes of the measured value are seen, not whether it is right");
     notes.insert(notes.end(), out_.notes.begin(), out_.notes.end());
     notes.insert(notes.end(), table_.notes.begin(), table_.notes.end());
     out_.notes = std::move(notes);
@@ -187,7 +200,8 @@ class Reader {
 
 }  // namespace
 
-Result<Readings> parseReadings(std::string_view bytes, const TableMap& map, const std::filesystem::path& name) {
+Result<Readings> parseReadings(std::string_view bytes, const TableMap& map,
+                               const std::filesystem::path& name) {
   auto table = parseTable(bytes, name);
   if (!table) return table.error();
   return Reader{*std::move(table), map}.read();

@@ -80,7 +80,8 @@ class Splitter {
     if (delimiter_ == kBlanks && records_.fields.size() > before + 1 && records_.fields.back().empty())
       records_.fields.pop_back();  // blanks at the end of a line
     bool is_empty = true;
-    for (std::size_t i = before; i < records_.fields.size(); ++i) is_empty = is_empty && records_.fields[i].empty();
+    for (std::size_t i = before; i < records_.fields.size(); ++i)
+      is_empty = is_empty && records_.fields[i].empty();
     if (is_empty && !records_.open_quote) {  // as spreadsheets write empty rows
       records_.fields.resize(before), records_.line.pop_back();
     } else {

@@ -27,7 +27,8 @@ bool isLengthOrNone(const TableColumn& column) {
 
 std::string namesOf(const Table& table, const std::vector<std::size_t>& columns) {
   std::string words;
-  for (const std::size_t column : columns) words += (words.empty() ? "" : ", ") + table.columns[column].header;
+  for (const std::size_t column : columns)
+    words += (words.empty() ? "" : ", ") + table.columns[column].header;
   return words;
 }
 
@@ -40,8 +41,9 @@ class Assignment {
     if (said.empty()) return {};
     const auto at = table_.find(said);
     if (!at && at.error().code == Error::Code::NotFound) {
-      return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\" for `{}`, only: {}", table_.file.string(),
-                                                      said, key, fmt::join(table_.headers(), ", "))};
+      return Error{Error::Code::NotFound,
+                   fmt::format("{}: has no column \"{}\" for `{}`, only: {}", table_.file.string(), said, key,
+                               fmt::join(table_.headers(), ", "))};
     }
     if (!at) return at.error();
     if (const auto [other, is_new] = taken_.try_emplace(*at, key); !is_new) {
@@ -78,8 +80,8 @@ bool mayBeError(const TableColumn& column) {
   return column.kind == Kind::Number && isLengthOrNone(column) && !says(column.stem, Meaning::Sigma);
 }
 bool mayBeMeasured(const TableColumn& column) {
-  return column.kind == Kind::Number && !says(column.stem, Meaning::Sigma) && !says(column.stem, Meaning::Error) &&
-         strengthOf(column.stem, Meaning::Reference) < 2;
+  return column.kind == Kind::Number && !says(column.stem, Meaning::Sigma) &&
+         !says(column.stem, Meaning::Error) && strengthOf(column.stem, Meaning::Reference) < 2;
 }
 bool mayBeReference(const TableColumn& column) {
   return column.kind == Kind::Number && isLengthOrNone(column) && !says(column.stem, Meaning::Sigma) &&
@@ -163,10 +165,12 @@ class Guesser {
       std::erase(roles_.other_references, *roles_.measured);
       return {};
     }
-    const std::string map = "Write a map: measured = \"…\" and reference = \"…\", or error = \"…\" (docs/discover.md)";
+    const std::string map =
+        "Write a map: measured = \"…\" and reference = \"…\", or error = \"…\" (docs/discover.md)";
     if (found.empty()) {
-      return badMap(table_, fmt::format("which column was measured? None of the headers says so alone ({}). {}",
-                                        fmt::join(table_.headers(), ", "), map));
+      return badMap(table_,
+                    fmt::format("which column was measured? None of the headers says so alone ({}). {}",
+                                fmt::join(table_.headers(), ", "), map));
     }
     return badMap(table_, fmt::format("which column was measured: {}? {}", namesOf(table_, found), map));
   }
@@ -177,19 +181,20 @@ class Guesser {
     std::vector<std::size_t> found;
     for (std::size_t c = 0; c < table_.columns.size(); ++c) {
       const TableColumn& one = table_.columns[c];
-      if (!free_.isTaken(c) && isLength(c) && mayBeMeasured(one) && !says(one.stem, Meaning::Target)) found.push_back(c);
+      if (!free_.isTaken(c) && isLength(c) && mayBeMeasured(one) && !says(one.stem, Meaning::Target))
+        found.push_back(c);
     }
     return found;
   }
 
-  /// Of sessions every test depends, so that none is left to chance: of several that say it alike the one that says
-  /// nothing else.
+  /// Of sessions every test depends, so that none is left to chance: of several that say it alike the one
+  /// that says nothing else.
   Result<> guessGroup(std::optional<std::size_t>& role, Meaning meaning, const char* key, bool is_needed) {
     if (role) return {};
     auto found = free_.likeliest(meaning, [&](const TableColumn& one) {
-      // "run_time_s" is a time, "day" of a column of dates is one, too.
-      const bool says_other = says(one.stem, Meaning::Time) || says(one.stem, Meaning::Device);
-      return one.unit.empty() && one.kind != Kind::Time && !(says_other && !saysOnly(one.stem, meaning));
+      const bool says_other =
+          says(one.stem, Meaning::Time) || says(one.stem, Meaning::Device);  // "run_time_s"
+      return one.unit.empty() && (saysOnly(one.stem, meaning) || (one.kind != Kind::Time && !says_other));
     });
     std::vector<std::size_t> plain;
     std::ranges::copy_if(found, std::back_inserter(plain),
@@ -197,9 +202,10 @@ class Guesser {
     if (!plain.empty()) found = plain;
     if (found.size() > 1 && plain.empty()) {
       if (!is_needed) return {};
-      return badMap(table_, fmt::format("which column names the {}: {}? Write a map: {} = \"…\", or ignore = [\"…\"] "
-                                        "(docs/discover.md)",
-                                        key, namesOf(table_, found), key));
+      return badMap(table_,
+                    fmt::format("which column names the {}: {}? Write a map: {} = \"…\", or ignore = [\"…\"] "
+                                "(docs/discover.md)",
+                                key, namesOf(table_, found), key));
     }
     if (!found.empty()) role = found.front(), free_.take(*role);
     return {};
@@ -210,14 +216,15 @@ class Guesser {
   Assignment& free_;
 };
 
-Result<> takeCovariates(const Table& table, const TableMap& map, const std::set<std::size_t>& ignored, Roles& roles) {
+Result<> takeCovariates(const Table& table, const TableMap& map, const std::set<std::size_t>& ignored,
+                        Roles& roles) {
   std::set<std::size_t> seen;
   for (const MappedCovariate& covariate : map.covariates) {
     const auto at = table.find(covariate.column);
     if (!at) {
-      return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\" for a covariate, only: {}",
-                                                      table.file.string(), covariate.column,
-                                                      fmt::join(table.headers(), ", "))};
+      return Error{Error::Code::NotFound,
+                   fmt::format("{}: has no column \"{}\" for a covariate, only: {}", table.file.string(),
+                               covariate.column, fmt::join(table.headers(), ", "))};
     }
     if (!seen.insert(*at).second)
       return badMap(table, fmt::format("column \"{}\" is a covariate twice", covariate.column));
@@ -279,9 +286,10 @@ Result<Roles> rolesOf(const Table& table, const TableMap& map) {
 
 std::string inWords(const Table& table, const Roles& roles) {
   const auto name = [&](std::size_t column) { return table.columns[column].header; };
-  std::string words = roles.error        ? fmt::format("error = {}{}", roles.is_reversed ? "−" : "", name(*roles.error))
-                      : !roles.reference ? fmt::format("error = {} (without a reference)", name(*roles.measured))
-                                         : fmt::format("error = {} − {}", name(*roles.measured), name(*roles.reference));
+  std::string words =
+      roles.error        ? fmt::format("error = {}{}", roles.is_reversed ? "−" : "", name(*roles.error))
+      : !roles.reference ? fmt::format("error = {} (without a reference)", name(*roles.measured))
+                         : fmt::format("error = {} − {}", name(*roles.measured), name(*roles.reference));
   for (const auto& [role, what] : {std::pair{&roles.sigma, "sigma"}, std::pair{&roles.session, "session"},
                                    std::pair{&roles.capture, "capture"}, std::pair{&roles.locked, "locked"}})
     if (*role) words += fmt::format("; {} = {}", what, name(**role));

@@ -1,13 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/table/stamp.h"
 
-#include <algorithm>
-#include <array>
 #include <charconv>
 #include <chrono>
 #include <string>
 #include <vector>
 
+#include "calib/table/calendar_words.h"
 #include "calib/table/number.h"
 #include "calib/table/records.h"
 
@@ -45,49 +44,6 @@ double takenFraction(std::string_view& text) {
   double value = 0.0;
   std::from_chars(digits.data(), digits.data() + digits.size(), value);
   return value;
-}
-
-/// Months by the letters that no other month of the five languages begins with.
-int monthOf(std::string_view word) {
-  struct Month {
-    std::string_view begins;
-    int number;
-  };
-  constexpr std::array kMonths{
-      Month{"jan", 1},  Month{"ene", 1},  Month{"gen", 1},  Month{"feb", 2},  Month{"fev", 2},  Month{"mar", 3},
-      Month{"apr", 4},  Month{"avr", 4},  Month{"abr", 4},  Month{"may", 5},  Month{"mai", 5},  Month{"mag", 5},
-      Month{"jun", 6},  Month{"juin", 6}, Month{"giu", 6},  Month{"jul", 7},  Month{"juil", 7}, Month{"lug", 7},
-      Month{"aug", 8},  Month{"aou", 8},  Month{"ago", 8},  Month{"sep", 9},  Month{"set", 9},  Month{"oct", 10},
-      Month{"okt", 10}, Month{"ott", 10}, Month{"nov", 11}, Month{"dec", 12}, Month{"dez", 12}, Month{"dic", 12}};
-  const std::string small = folded(word);
-  for (const Month& one : kMonths)
-    if (small.starts_with(one.begins)) return one.number;
-  return 0;
-}
-
-bool isWeekday(std::string_view word) {
-  constexpr std::array<std::string_view, 24> kBegin{"mon", "tue", "wed", "thu", "fri", "sat", "sun", "die",
-                                                    "mit", "don", "fre", "sam", "son", "lun", "mer", "jeu",
-                                                    "ven", "dim", "mie", "jue", "vie", "sab", "dom", "gio"};
-  constexpr std::array<std::string_view, 8> kWhole{"mo", "di", "mi", "do", "fr", "sa", "so", "mar"};
-  const std::string small = folded(word);
-  return std::ranges::find(kWhole, small) != kWhole.end() || small.starts_with("mart") ||
-         std::ranges::any_of(kBegin, [&](std::string_view one) { return small.starts_with(one); });
-}
-
-/// How far a zone that is a word is ahead of UTC, in hours.
-std::optional<double> hoursAhead(std::string_view word) {
-  struct Zone {
-    std::string_view name;
-    double hours;
-  };
-  constexpr std::array kZones{Zone{"z", 0},    Zone{"utc", 0},  Zone{"gmt", 0},  Zone{"cet", 1},  Zone{"cest", 2},
-                              Zone{"mez", 1},  Zone{"mesz", 2}, Zone{"bst", 1},  Zone{"eet", 2},  Zone{"eest", 3},
-                              Zone{"est", -5}, Zone{"edt", -4}, Zone{"cst", -6}, Zone{"cdt", -5}, Zone{"mst", -7},
-                              Zone{"mdt", -6}, Zone{"pst", -8}, Zone{"pdt", -7}, Zone{"jst", 9}};
-  const std::string small = folded(word);
-  const auto at = std::ranges::find(kZones, small, &Zone::name);
-  return at == kZones.end() ? std::nullopt : std::optional{at->hours};
 }
 
 std::string_view takenWord(std::string_view& text) {
@@ -185,7 +141,8 @@ bool takeBasic(std::string_view text, Stamp& stamp) {
   stamp.order = DateOrder::YearFirst, stamp.has_time = true;
   stamp.year = *date / 10000, stamp.first = *date / 100 % 100, stamp.second = *date % 100;
   if (*clock / 10000 > 23 || *clock / 100 % 100 > 59 || *clock % 100 > 60) return false;
-  stamp.seconds = kHour_s * (*clock / 10000) + kMinute_s * (*clock / 100 % 100) + *clock % 100 + takenFraction(text);
+  stamp.seconds =
+      kHour_s * (*clock / 10000) + kMinute_s * (*clock / 100 % 100) + *clock % 100 + takenFraction(text);
   return takeBehind(text, stamp) && text.empty();
 }
 
@@ -198,11 +155,11 @@ bool takeDuration(std::string_view text, Stamp& stamp) {
     const double value = *whole + takenFraction(text);
     text = trimmed(text);
     const std::string unit = folded(takenWord(text));
-    const double factor = unit == "d"                                     ? kDay_s
-                          : unit == "h"                                   ? kHour_s
-                          : unit == "m" || unit == "min"                  ? kMinute_s
-                          : unit == "s" || unit == "sec"                  ? 1.0
-                                                                          : 0.0;
+    const double factor = unit == "d"                    ? kDay_s
+                          : unit == "h"                  ? kHour_s
+                          : unit == "m" || unit == "min" ? kMinute_s
+                          : unit == "s" || unit == "sec" ? 1.0
+                                                         : 0.0;
     if (factor == 0.0 || factor >= before) return false;
     before = factor, stamp.seconds += factor * value, stamp.has_time = true;
     text = trimmed(text);
@@ -232,7 +189,9 @@ std::optional<DateParts> partsOfDate(std::string_view text) {
       const int month = monthOf(word);
       const bool is_first = parts.numbers.empty() && parts.month == 0;
       // "Mar" is a Tuesday in French where a month follows.
-      if (month != 0 && parts.month == 0 && !(is_first && isWeekday(word) && text.find_first_not_of(" ,.0123456789") != std::string_view::npos)) {
+      if (month != 0 && parts.month == 0 &&
+          !(is_first && isWeekday(word) &&
+            text.find_first_not_of(" ,.0123456789") != std::string_view::npos)) {
         parts.month = month;
       } else if (!(is_first && isWeekday(word)) && folded(word) != "de") {
         return std::nullopt;
@@ -300,10 +259,12 @@ bool isThere(const Stamp& stamp) {
 }  // namespace
 
 std::optional<double> Stamp::days(bool is_month_first) const {
-  const bool is_day_first = order == DateOrder::DayFirst || (order == DateOrder::DayOrMonthFirst && !is_month_first);
+  const bool is_day_first =
+      order == DateOrder::DayFirst || (order == DateOrder::DayOrMonthFirst && !is_month_first);
   const int month = is_day_first ? second : first, day = is_day_first ? first : second;
   if (month < 1 || day < 1) return std::nullopt;
-  const std::chrono::year_month_day date{std::chrono::year{year}, std::chrono::month{static_cast<unsigned>(month)},
+  const std::chrono::year_month_day date{std::chrono::year{year},
+                                         std::chrono::month{static_cast<unsigned>(month)},
                                          std::chrono::day{static_cast<unsigned>(day)}};
   if (!date.ok()) return std::nullopt;
   return static_cast<double>(std::chrono::sys_days{date}.time_since_epoch().count());
@@ -323,13 +284,15 @@ std::optional<Stamp> stampIn(std::string_view field) {
   while (begin > 0 && isNumeral(field[begin - 1])) --begin;
   std::string_view before = trimmed(field.substr(0, begin)), clock = field.substr(begin);
   if (!takeClock(clock, stamp)) return std::nullopt;
-  if (!before.empty() && (before.back() == 'T' || before.back() == 't' || before.back() == '_' || before.back() == ','))
+  if (!before.empty() &&
+      (before.back() == 'T' || before.back() == 't' || before.back() == '_' || before.back() == ','))
     before.remove_suffix(1);
   if (const auto days = daysBefore(before)) {
     stamp.seconds += *days, before = {};
   }
   if (!takeBehind(clock, stamp)) return std::nullopt;
-  const std::string date = clock.empty() ? std::string{before} : std::string{before} + " " + std::string{clock};
+  const std::string date =
+      clock.empty() ? std::string{before} : std::string{before} + " " + std::string{clock};
   if (!date.empty() && (stamp.seconds > 2 * kDay_s || !takeDate(date, stamp))) return std::nullopt;
   return isThere(stamp) ? std::optional{stamp} : std::nullopt;
 }

@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "calib/table/column.h"
+#include "calib/table/delimiter.h"
 #include "calib/table/encoding.h"
 #include "calib/table/layout.h"
 #include "calib/table/number.h"
@@ -41,7 +42,8 @@ std::vector<ColumnFields> columnsOf(const Records& records, const Layout& layout
     for (std::size_t c = 0; c < columns.size(); ++c) {
       std::string_view field = records.at(row)[c];
       // ="007" keeps spreadsheets from changing it.
-      if (field.size() > 3 && field.starts_with("=\"") && field.ends_with('"')) field = field.substr(2, field.size() - 3);
+      if (field.size() > 3 && field.starts_with("=\"") && field.ends_with('"'))
+        field = field.substr(2, field.size() - 3);
       columns[c].push_back(field);
     }
   return columns;
@@ -50,7 +52,8 @@ std::vector<ColumnFields> columnsOf(const Records& records, const Layout& layout
 /// A column without a name and without any field comes from separators at the ends of lines.
 void dropEmptyColumns(Layout& layout, std::vector<ColumnFields>& columns) {
   for (std::size_t c = columns.size(); c-- > 0;) {
-    const bool is_empty = std::ranges::all_of(columns[c], [](std::string_view field) { return field.empty(); });
+    const bool is_empty =
+        std::ranges::all_of(columns[c], [](std::string_view field) { return field.empty(); });
     if (!layout.header[c].empty() || !is_empty || columns.size() == 1) continue;
     const auto at = static_cast<std::ptrdiff_t>(c);
     columns.erase(columns.begin() + at), layout.header.erase(layout.header.begin() + at);
@@ -87,13 +90,36 @@ void dropSums(std::vector<ColumnFields>& columns, Table& table) {
   table.line.resize(table.line.size() - sums.size());
 }
 
+/// What each column holds; the decimal signs of all of them decide where one alone does not say it.
+void readColumns(const Layout& layout, const std::vector<ColumnFields>& columns, char delimiter,
+                 Table& table) {
+  DecimalEvidence evidence;
+  std::vector<SignCounts> counts;
+  for (const ColumnFields& fields : columns) {
+    counts.push_back(signCounts(fields));
+    const DecimalEvidence one = evidenceIn(counts.back());
+    evidence.has_point = evidence.has_point || one.has_point,
+    evidence.has_comma = evidence.has_comma || one.has_comma;
+  }
+  for (std::size_t c = 0; c < columns.size(); ++c) {
+    TableColumn& column = table.columns.emplace_back();
+    nameColumn(layout.header[c], layout.units.empty() ? std::string{} : layout.units[c], column);
+    readColumn(columns[c], counts[c], evidence, delimiter, column);
+    const bool is_time_index =
+        c == 0 && column.header.empty() && column.kind == Kind::Time && layout.header_line;
+    if (is_time_index) column.header = column.stem = "time";  // as pandas writes an index of times
+  }
+}
+
 Result<> checkSize(const Layout& layout, const Records& records, const std::filesystem::path& name) {
   const std::size_t first = layout.header_line.value_or(records.size() > 0 ? records.line.front() : 1);
   if (layout.header.size() > kMostColumns)
-    return malformedAt(name, first, fmt::format("has {} columns, more than {}", layout.header.size(), kMostColumns));
+    return malformedAt(name, first,
+                       fmt::format("has {} columns, more than {}", layout.header.size(), kMostColumns));
   if (layout.rows.empty()) return malformedAt(name, first, "has a header but no rows");
   if (layout.rows.size() > kMostRows)
-    return malformedAt(name, records.line[layout.rows[kMostRows]], "is beyond a million rows: thin the table");
+    return malformedAt(name, records.line[layout.rows[kMostRows]],
+                       "is beyond a million rows: thin the table");
   return {};
 }
 
@@ -120,18 +146,7 @@ Result<Table> parseTable(std::string_view bytes, const std::filesystem::path& na
   dropEmptyColumns(*layout, columns);
   dropSums(columns, table);
   dropIndex(*layout, columns, table);
-  DecimalEvidence evidence;
-  for (const ColumnFields& fields : columns) {
-    const DecimalEvidence one = evidenceIn(fields);
-    evidence.has_point = evidence.has_point || one.has_point, evidence.has_comma = evidence.has_comma || one.has_comma;
-  }
-  for (std::size_t c = 0; c < columns.size(); ++c) {
-    TableColumn& column = table.columns.emplace_back();
-    nameColumn(layout->header[c], layout->units.empty() ? std::string{} : layout->units[c], column);
-    readColumn(columns[c], evidence, delimiter, column);
-    const bool is_time_index = c == 0 && column.header.empty() && column.kind == Kind::Time && layout->header_line;
-    if (is_time_index) column.header = column.stem = "time";  // as pandas writes an index of times
-  }
+  readColumns(*layout, columns, delimiter, table);
   for (std::size_t row = 0; row < table.rows(); ++row)
     for (const ColumnFields& fields : columns) table.fields_.push_back(fields[row]);
   table.unquoted_ = std::move(records.unquoted);
@@ -160,11 +175,12 @@ std::vector<std::string> Table::headers() const {
 Result<std::size_t> Table::find(std::string_view header) const {
   const auto at = std::ranges::find(columns, header, &TableColumn::header);
   if (at == columns.end()) {
-    return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\", only: {}", file.string(), header,
-                                                    fmt::join(headers(), ", "))};
+    return Error{Error::Code::NotFound, fmt::format("{}: has no column \"{}\", only: {}", file.string(),
+                                                    header, fmt::join(headers(), ", "))};
   }
   if (std::ranges::count(columns, header, &TableColumn::header) > 1)
-    return Error{Error::Code::Malformed, fmt::format("{}: has two columns \"{}\": rename one", file.string(), header)};
+    return Error{Error::Code::Malformed,
+                 fmt::format("{}: has two columns \"{}\": rename one", file.string(), header)};
   return static_cast<std::size_t>(at - columns.begin());
 }
 

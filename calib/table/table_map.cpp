@@ -11,8 +11,9 @@ Result<TableMap> loadTableMap(const std::filesystem::path& file) {
   if (!table && table.error().code == Error::Code::InvalidArgument) {
     // The parser says what it stumbled over in words of its own.
     return Error{Error::Code::InvalidArgument,
-                 table.error().message + ". A line of a map is a key and its value, texts in quotes: measured = "
-                                         "\"depth_mm\", modulation_mhz = 30, ignore = [\"comment\"]"};
+                 table.error().message +
+                     ". A line of a map is a key and its value, texts in quotes: measured = "
+                     "\"depth_mm\", modulation_mhz = 30, ignore = [\"comment\"]"};
   }
   if (!table) return table.error();
   TableMap map;

@@ -53,9 +53,11 @@ std::optional<Times> withDates(const Stamps& stamps) {
   const bool is_open = std::ranges::any_of(
       stamps, [](const auto& one) { return one && one->order == DateOrder::DayOrMonthFirst; });
   if (is_open)
-    times.note = is_month_first ? "its dates are read with the month first" : "its dates are read with the day first";
+    times.note =
+        is_month_first ? "its dates are read with the month first" : "its dates are read with the day first";
   for (const auto& stamp : stamps)
-    times.seconds.push_back(stamp ? kSecondsOfDay * *stamp->days(is_month_first) + stamp->seconds : std::nan(""));
+    times.seconds.push_back(stamp ? kSecondsOfDay * *stamp->days(is_month_first) + stamp->seconds
+                                  : std::nan(""));
   return times;
 }
 
@@ -83,7 +85,9 @@ std::optional<Times> withoutDates(const Stamps& stamps) {
   if (has_pair && !are_minutes && is_beyond_day) return std::nullopt;
   Times times;
   for (const auto& stamp : stamps)
-    times.seconds.push_back(!stamp ? std::nan("") : stamp->is_pair && are_minutes ? stamp->seconds / 60.0 : stamp->seconds);
+    times.seconds.push_back(!stamp                          ? std::nan("")
+                            : stamp->is_pair && are_minutes ? stamp->seconds / 60.0
+                                                            : stamp->seconds);
   if (are_minutes) times.note = "its times are read as minutes and seconds";
   if (!is_beyond_day && !are_minutes) goOverMidnight(times.seconds);
   return times;
@@ -94,23 +98,25 @@ std::optional<Times> withoutDates(const Stamps& stamps) {
 std::optional<Times> timesIn(const std::vector<std::string_view>& fields) {
   const auto stamps = stampsOf(fields);
   if (!stamps) return std::nullopt;
-  const bool has_dates =
-      std::ranges::any_of(*stamps, [](const auto& one) { return one && one->hasDate(); });
+  const bool has_dates = std::ranges::any_of(*stamps, [](const auto& one) { return one && one->hasDate(); });
   return has_dates ? withDates(*stamps) : withoutDates(*stamps);
 }
 
 std::optional<Epoch> epochOf(const std::vector<double>& values, bool may_be_days) {
   constexpr double k1990_s = 631'152'000.0, k2100_s = 4'102'444'800.0;
-  constexpr double k2000_days = 36'526.0, k2050_days = 54'789.0, kDaysTo1970 = 25'569.0;  // Excel's day 0: 1899-12-30
+  constexpr double k2000_days = 36'526.0, k2050_days = 54'789.0,
+                   kDaysTo1970 = 25'569.0;  // Excel's day 0: 1899-12-30
   double low = std::numeric_limits<double>::infinity(), high = -low;
   for (const double value : values)
     if (std::isfinite(value)) low = std::min(low, value), high = std::max(high, value);
   if (!(high >= low)) return std::nullopt;
-  for (const auto& [seconds, name] : {std::pair{1.0, "seconds"}, {1e-3, "milliseconds"}, {1e-6, "microseconds"}, {1e-9, "nanoseconds"}})
+  for (const auto& [seconds, name] :
+       {std::pair{1.0, "seconds"}, {1e-3, "milliseconds"}, {1e-6, "microseconds"}, {1e-9, "nanoseconds"}})
     if (low * seconds > k1990_s && high * seconds < k2100_s)
       return Epoch{.seconds_per_unit = seconds, .name = std::string{name} + " since 1970"};
   if (may_be_days && low > k2000_days && high < k2050_days && high - low < 3'660.0) {
-    return Epoch{.seconds_per_unit = kSecondsOfDay, .offset_s = -kDaysTo1970 * kSecondsOfDay,
+    return Epoch{.seconds_per_unit = kSecondsOfDay,
+                 .offset_s = -kDaysTo1970 * kSecondsOfDay,
                  .name = "a spreadsheet's days"};
   }
   return std::nullopt;

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/compare/csv.h"
+#include "calib/compare/thesis_data.h"
 #include "calib/compare/held_out.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/scatter_laws.h"

@@ -7,12 +7,13 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/compare/csv.h"
+#include "calib/compare/thesis_data.h"
 #include "calib/compare/fits.h"
 #include "calib/compare/published_model.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/real_published.h"
 #include "calib/compare/simulated_line.h"
+#include "calib/table/table.h"
 
 namespace toftwin::compare {
 namespace {
@@ -196,7 +197,7 @@ class PublishedData : public testing::Test {
   /// Theirs − exact for every 8th ray: mean over the line.
   double meanDifference(const CornerTrace& what) {
     const auto columns =
-        loadColumns(folder / "corner_max_path_length_2.csv", {"x_mm", "z_mm", "reference_z_mm"});
+        table::readNumbers(folder / "corner_max_path_length_2.csv", {"x_mm", "z_mm", "reference_z_mm"});
     if (!columns) return std::nan("");
     double sum = 0.0;
     int n = 0;
@@ -226,10 +227,10 @@ TEST_F(PublishedData, EveryOtherReadingOfItsModelIsExcluded) {
 }
 
 TEST_F(PublishedData, SquareWaveDistanceErrorIsTheClosedFormWithTheOtherSign) {
-  const auto rays = loadColumns(folder / "corner_path_length_16_reference.csv", {"x_mm", "z_mm"});
+  const auto rays = table::readNumbers(folder / "corner_path_length_16_reference.csv", {"x_mm", "z_mm"});
   ASSERT_TRUE(rays.ok());
   for (const int mhz : {20, 30}) {
-    const auto table = loadColumns(folder / ("distance_error_" + std::to_string(mhz) + "mhz.csv"),
+    const auto table = table::readNumbers(folder / ("distance_error_" + std::to_string(mhz) + "mhz.csv"),
                                    {"reference_mm", "reference_minus_measured_mm"});
     ASSERT_TRUE(table.ok());
     double square = 0.0;

@@ -9,12 +9,13 @@
 #include <gtest/gtest.h>
 
 #include "calib/compare/compare.h"
-#include "calib/compare/csv.h"
+#include "calib/compare/thesis_data.h"
 #include "calib/compare/fits.h"
 #include "calib/compare/real_box.h"
 #include "calib/compare/real_data.h"
 #include "calib/compare/scan_line.h"
 #include "calib/compare/statistics.h"
+#include "calib/table/table.h"
 #include "sim/sensor/sensor_model.h"
 
 namespace toftwin::compare {
@@ -75,7 +76,7 @@ INSTANTIATE_TEST_SUITE_P(Cameras, RealCorner,
 
 TEST_F(RealData, KinectWarmsUpByNearlyFourMillimetres) {
   const auto columns =
-      loadColumns(folder / "warmup_drift" / "kinect_v2.csv", {"time_s", "depth_mm"});
+      table::readNumbers(folder / "warmup_drift" / "kinect_v2.csv", {"time_s", "depth_mm"});
   ASSERT_TRUE(columns.ok());
   const auto& time = (*columns)[0];
   const auto& depth = (*columns)[1];
@@ -91,7 +92,7 @@ TEST_F(RealData, KinectWarmsUpByNearlyFourMillimetres) {
 /// to come when the series ends than it rose in the second half of it.
 TEST_F(RealData, KinectPresetWarmsUpAsMeasured) {
   const auto columns =
-      loadColumns(folder / "warmup_drift" / "kinect_v2.csv", {"time_s", "depth_mm"});
+      table::readNumbers(folder / "warmup_drift" / "kinect_v2.csv", {"time_s", "depth_mm"});
   ASSERT_TRUE(columns.ok());
   const auto& time = (*columns)[0];
   const auto& depth = (*columns)[1];
@@ -113,7 +114,7 @@ TEST_F(RealData, KinectPresetWarmsUpAsMeasured) {
 }
 
 TEST_F(RealData, KinectReadsFiveToEighteenMillimetresTooFarBelowTwoMetresThirty) {
-  const auto columns = loadColumns(folder / "distance_error" / "kinect_v2.csv",
+  const auto columns = table::readNumbers(folder / "distance_error" / "kinect_v2.csv",
                                    {"reference_mm", "reference_minus_measured_mm"});
   ASSERT_TRUE(columns.ok());
   for (double from = 700.0; from < 2300.0; from += 100.0) {
@@ -138,7 +139,7 @@ class RealNoise : public RealData, public testing::WithParamInterface<NoiseFact>
 TEST_P(RealNoise, LawHasTheReadmesConstants) {
   const auto& fact = GetParam();
   const auto table =
-      loadColumns(folder / "noise" / (std::string{fact.camera} + "_sigma_vs_intensity.csv"),
+      table::readNumbers(folder / "noise" / (std::string{fact.camera} + "_sigma_vs_intensity.csv"),
                   {"intensity_counts", "sigma_mm"});
   ASSERT_TRUE(table.ok());
   const NoiseLaw law = fitNoiseLaw((*table)[0], (*table)[1]);

@@ -9,7 +9,6 @@
 
 #include <gtest/gtest.h>
 
-#include "calib/compare/csv.h"
 #include "calib/compare/statistics.h"
 
 namespace toftwin::compare {
@@ -105,70 +104,6 @@ TEST(Corner, IsRefusedOnAFlatWall) {
   const auto fit = fitCorner(toScanLine(x, z));
   ASSERT_FALSE(fit.ok());
   EXPECT_NE(fit.error().message.find("corner"), std::string::npos);
-}
-
-class Csv : public testing::Test {
- protected:
-  std::filesystem::path write(const std::string& text) {
-    const auto file =
-        std::filesystem::path{testing::TempDir()} /
-        (std::string{testing::UnitTest::GetInstance()->current_test_info()->name()} + ".csv");
-    std::ofstream{file} << text;
-    return file;
-  }
-};
-
-TEST_F(Csv, GivesColumnsByNameInTheOrderAsked) {
-  const auto columns = loadColumns(write("a,b,c\r\n1,2,3\r\n4,5,6\r\n"), {"c", "a"});
-  ASSERT_TRUE(columns.ok()) << columns.error().message;
-  EXPECT_EQ((*columns)[0], (std::vector<double>{3, 6}));
-  EXPECT_EQ((*columns)[1], (std::vector<double>{1, 4}));
-}
-
-TEST_F(Csv, NamesFileLineAndColumnOfEveryMistake) {
-  const auto message = [&](const std::string& text) {
-    const auto columns = loadColumns(write(text), {"x_mm", "z_mm"});
-    return columns.ok() ? std::string{"no error"} : columns.error().message;
-  };
-  EXPECT_NE(message("x_mm,y\n1,2\n").find(":1: has no column \"z_mm\""), std::string::npos);
-  EXPECT_NE(message("x_mm,z_mm\n1,2\n3\n").find(":3: has 1 field, but the header has 2"), std::string::npos);
-  EXPECT_NE(message("x_mm,z_mm\n1,\"2\n").find(":2: a quote is opened"), std::string::npos);
-  EXPECT_NE(message("x_mm,z_mm\n1,two\n").find(":2: \"two\" is not a number"), std::string::npos);
-  EXPECT_NE(message("x_mm,z_mm\n").find("no rows"), std::string::npos);
-  EXPECT_NE(message("").find("empty"), std::string::npos);
-}
-
-/// Such a row was read as if its first fields were the header's: 1500,244 as 1500, and 1,500.064 as 1.
-TEST_F(Csv, RefusesRowsWithMoreFieldsThanTheHeader) {
-  for (const char* row : {"10,1500,244", "10,1,500.064", "10,5,1500,064"}) {
-    const auto columns = loadColumns(write(std::string{"time_s,value_mm\n0,1500\n"} + row + "\n"), {"value_mm"});
-    ASSERT_FALSE(columns.ok()) << row;
-    const std::string& words = columns.error().message;
-    EXPECT_NE(words.find(".csv:3: has "), std::string::npos) << words;
-    EXPECT_NE(words.find("but the header has 2; commas in its numbers may be why"), std::string::npos) << words;
-  }
-}
-
-TEST_F(Csv, TakesAQuotedTextWithCommasForOneField) {
-  const auto columns = loadColumns(write("\"a, b\",note,x_mm\n1,\"cold, dark\",3\n"), {"x_mm", "a, b"});
-  ASSERT_TRUE(columns.ok()) << columns.error().message;
-  EXPECT_EQ(*columns, (std::vector<std::vector<double>>{{3}, {1}}));
-}
-
-TEST_F(Csv, GivesAColumnThatAFileNeedNotHave) {
-  const auto there = loadColumnIfAny(write("a,b\n1,2\n4,5\n"), "b"), lacking = loadColumnIfAny(write("a\n1\n"), "b");
-  ASSERT_TRUE(there.ok() && lacking.ok());
-  EXPECT_EQ(*there, (std::vector<double>{2, 5}));
-  EXPECT_FALSE(lacking->has_value());
-  const auto words = loadColumnIfAny(write("a,b\n1,two\n"), "b");
-  ASSERT_FALSE(words.ok());
-  EXPECT_NE(words.error().message.find(":2: \"two\" is not a number"), std::string::npos);
-}
-
-TEST_F(Csv, AMissingFileIsNamed) {
-  const auto columns = loadColumns("/nonexistent/line.csv", {"x_mm"});
-  ASSERT_FALSE(columns.ok());
-  EXPECT_NE(columns.error().message.find("/nonexistent/line.csv"), std::string::npos);
 }
 
 }  // namespace

@@ -15,7 +15,7 @@
 
 #include <fmt/format.h>
 
-#include "calib/compare/csv.h"
+#include "calib/compare/thesis_data.h"
 #include "tests/record/record_testing.h"
 
 namespace toftwin::compare {
@@ -221,8 +221,9 @@ TEST_F(Table, SaysWhatIsWrongWithSessions) {
     const auto table = loadTable({.file = write("s.csv", text), .kind = "motion"});
     return table ? std::string{} : table.error().message;
   };
-  EXPECT_THAT(errorOf("morning", "2"), HasSubstr("s.csv:2: \"morning\" is not a number; sessions are numbered"));
-  EXPECT_THAT(errorOf("", "2"), HasSubstr("s.csv:2: \"\" is not a number"));
+  EXPECT_THAT(errorOf("morning", "2"), HasSubstr("s.csv:2: \"morning\" in column \"session\" is not a number"));
+  EXPECT_EQ(errorOf("morning", "morning"), "");
+  EXPECT_THAT(errorOf("", "2"), HasSubstr("column \"session\" is nan in row 1"));
   EXPECT_THAT(errorOf("nan", "2"), HasSubstr("column \"session\" is nan in row 1"));
   EXPECT_THAT(errorOf("0", ""), HasSubstr("has 12 values in 12 rows: it takes 3 rows of each"));
   EXPECT_EQ(errorOf("1", "1"), "");
@@ -283,8 +284,8 @@ TEST_F(Table, TakesZerosAsNoRange) {
   const auto table = loadTable({.file = write("a.csv", rows), .kind = "drift"});
   ASSERT_TRUE(table) << table.error().message;
   EXPECT_THAT(table->notes,
-              testing::ElementsAre("3 of 48 rows have a value_mm of 0, far from all others: they are "
-                                   "taken as missing"));
+              testing::ElementsAre("column value_mm: no reading: 0 is far from all other values (lines 9, 29, 49)",
+                                   "3 of 48 rows hold a value that is not finite, and are left out"));
   const auto report = judgeTables({{.file = write("a.csv", rows), .kind = "drift"}});
   ASSERT_TRUE(report) << report.error().message;
   EXPECT_THAT(report->verdict, testing::StartsWith("drift, slope: 0.04")) << "1/24 mm/s";
@@ -306,8 +307,9 @@ TEST_F(Table, RefusesFieldsThatItWouldMistake) {
   const auto refusalOf = [&](const std::string& text) {
     return loadTable({.file = write("a.csv", text), .kind = "drift"}).error().message;
   };
-  EXPECT_THAT(refusalOf("time_s;value_mm\n0;1,5\n"), HasSubstr("separated by semicolons"));
-  EXPECT_THAT(refusalOf("time_s\tvalue_mm\n0\t1.5\n"), HasSubstr("separated by tabs"));
+  EXPECT_THAT(refusalOf("time_s,value_mm\n0,1\n1,2,5\n"), HasSubstr("a.csv:3: has 3 fields, but the header has 2"));
+  EXPECT_THAT(refusalOf("time_s,value_mm\n0,1\n1,x7\n2,2\n3,3\n4,4\n5,5\n"),
+              HasSubstr("a.csv:3: \"x7\" in column \"value_mm\" is not a number"));
   EXPECT_THAT(refusalOf("time_s,value_mm,value_mm\n0,1,2\n"), HasSubstr("has two columns \"value_mm\""));
 }
 

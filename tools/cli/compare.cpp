@@ -8,7 +8,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "calib/compare/csv.h"
+#include "calib/compare/thesis_data.h"
 #include "calib/compare/follow.h"
 #include "calib/compare/real_data.h"
 #include "calib/plan/compare_run.h"

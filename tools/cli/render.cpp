@@ -181,7 +181,7 @@ void addTransient(Arguments& args, RenderOptions& options) {
 
 void addCampaign(Arguments& args, RenderOptions& options) {
   args.option("--trajectory", options.trajectory,
-              "poses of the camera (.toml or .csv): between times it moves, without times each "
+              "poses of the camera (.toml, or a text table): between times it moves, without times each "
               "pose gives a frame");
   args.option("-n,--frames,--count", options.frames,
               "how many; default: from the first pose of the trajectory to the last, or 1")

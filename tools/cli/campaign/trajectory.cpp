@@ -56,9 +56,7 @@ Result<Trajectory> loadTrajectoryToml(const std::filesystem::path& file) {
 
 Result<Trajectory> loadTrajectory(const std::filesystem::path& file) {
   if (file.extension() == ".toml") return loadTrajectoryToml(file);
-  if (file.extension() == ".csv") return loadTrajectoryCsv(file);
-  return Error{Error::Code::InvalidArgument,
-               fmt::format("{}: poses are read from .toml or .csv", file.string())};
+  return loadTrajectoryCsv(file);
 }
 
 Result<Schedule> scheduleOf(const Trajectory& trajectory, std::uint64_t frames, Duration frame_interval) {

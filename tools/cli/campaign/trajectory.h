@@ -14,6 +14,9 @@
 
 namespace toftwin::cli {
 
+/// Device times are counted in nanoseconds of 64 bits; seconds since 1970 are such times.
+constexpr double kMostTime_s = 9e9;
+
 /// A pose of a pose file as `toftwin compare` reads it, with the time at which the camera is there.
 struct TimedPoseSpec : compare::PoseSpec {
   Duration time{};
@@ -22,7 +25,7 @@ struct TimedPoseSpec : compare::PoseSpec {
   void visit(Visitor& v) {
     compare::PoseSpec::visit(v);
     v.quantity(
-        "time", time, second, {0.0, 9e9},
+        "time", time, second, {0.0, kMostTime_s},
         "when the camera is there, since device time 0; each later than the one before. In all poses or "
         "in none: then it stands still at each for one frame");
   }
@@ -34,8 +37,8 @@ struct Trajectory {
   bool has_times = false;  ///< else a frame at each pose, where the camera stands still
 };
 
-/// From [[pose]] tables (.toml), or from a table with the columns x_m, y_m, z_m, q_w, q_x, q_y, q_z and,
-/// perhaps, time_s (.csv). Errors name file and line.
+/// From [[pose]] tables (.toml), or from a text table of any other name with the columns x_m, y_m, z_m, q_w, q_x, q_y, q_z
+/// and, perhaps, time_s, or those of TUM's benchmark: tx, ty, tz, qx, qy, qz, qw, timestamp. Errors name file and line.
 Result<Trajectory> loadTrajectory(const std::filesystem::path& file);
 Result<Trajectory> loadTrajectoryToml(const std::filesystem::path& file);
 Result<Trajectory> loadTrajectoryCsv(const std::filesystem::path& file);

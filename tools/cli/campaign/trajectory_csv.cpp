@@ -1,110 +1,126 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
-#include <fstream>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <system_error>
+#include <vector>
 
+#include <fmt/format.h>
+
+#include "calib/table/number.h"
+#include "calib/table/table.h"
+#include "calib/table/times.h"
+#include "calib/table/units.h"
+#include "calib/table/words.h"
 #include "tools/cli/campaign/trajectory.h"
 
 namespace toftwin::cli {
 namespace {
 
-constexpr std::array<std::string_view, 8> kColumns{"time_s", "x_m", "y_m", "z_m", "q_w", "q_x", "q_y", "q_z"};
-constexpr double kMostPosition_m = 1e6, kMostTime_s = 9e9;  // as in a pose file
+/// What a column of a trajectory is called: our name of it, and what others write, without units, in small
+/// letters.
+struct PoseColumn {
+  const char* name;
+  std::array<std::string_view, 7> written;
+};
+constexpr std::array<PoseColumn, 8> kColumns{
+    {{"time_s", {}},  // by its words
+     {"x_m", {"x", "tx", "px", "pos_x", "position_x", "translation_x", "x_pos"}},
+     {"y_m", {"y", "ty", "py", "pos_y", "position_y", "translation_y", "y_pos"}},
+     {"z_m", {"z", "tz", "pz", "pos_z", "position_z", "translation_z", "z_pos"}},
+     {"q_w", {"q_w", "qw", "quat_w", "rotation_w", "orientation_w", "w", "rot_w"}},
+     {"q_x", {"q_x", "qx", "quat_x", "rotation_x", "orientation_x", "i", "rot_x"}},
+     {"q_y", {"q_y", "qy", "quat_y", "rotation_y", "orientation_y", "j", "rot_y"}},
+     {"q_z", {"q_z", "qz", "quat_z", "rotation_z", "orientation_z", "k", "rot_z"}}}};
+/// As the RGB-D benchmark of TUM writes poses where no line names the columns: t x y z qx qy qz qw.
+constexpr std::array<std::size_t, 8> kOrderOfTum{0, 1, 2, 3, 7, 4, 5, 6};
+constexpr double kMostPosition_m = 1e6;
 
-std::vector<std::string_view> split(std::string_view line) {
-  std::vector<std::string_view> fields;
-  while (true) {
-    const std::size_t comma = line.find(',');
-    std::string_view field = line.substr(0, comma);
-    const auto is_blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-    while (!field.empty() && is_blank(field.front())) field.remove_prefix(1);
-    while (!field.empty() && is_blank(field.back())) field.remove_suffix(1);
-    fields.push_back(field);
-    if (comma == std::string_view::npos) return fields;
-    line.remove_prefix(comma + 1);
-  }
-}
-
-/// Where each of kColumns is among the fields; nothing for one that is not there.
+/// Where each of kColumns is; nothing for one that is not there.
 using Places = std::array<std::optional<std::size_t>, kColumns.size()>;
 
-class Lines {
- public:
-  explicit Lines(const std::filesystem::path& file) : file_(file), in_(file) {}
+std::string plainName(const table::TableColumn& column) {
+  std::string name = table::folded(column.stem);
+  std::ranges::replace_if(
+      name, [](char c) { return c == '.' || c == ' ' || c == '-' || c == '/'; }, '_');
+  while (!name.empty() && name.front() == '_') name.erase(name.begin());
+  return name;
+}
 
-  [[nodiscard]] Error error(std::string_view what) const {
-    return {Error::Code::InvalidArgument, fmt::format("{}:{}: {}", file_.string(), number_, what)};
-  }
-  /// The fields of the next line that is not blank and no comment (#). False at the end.
-  bool next(std::vector<std::string_view>& fields) {
-    while (std::getline(in_, line_)) {
-      ++number_;
-      fields = split(line_);
-      if (fields.size() > 1 || (!fields[0].empty() && fields[0][0] != '#')) return true;
-    }
-    return false;
-  }
-  [[nodiscard]] bool isOpen() const { return in_.is_open(); }
+bool isTime(const table::TableColumn& column) {
+  const table::Unit* unit = table::findUnit(column.unit);
+  const bool is_unit_of_time =
+      column.unit.empty() || (unit != nullptr && unit->quantity == table::Quantity::Time);
+  return column.kind == table::Kind::Time ||
+         (is_unit_of_time && table::says(column.stem, table::Meaning::Time));
+}
 
- private:
-  std::filesystem::path file_;
-  std::ifstream in_;
-  std::string line_;
-  int number_ = 0;
-};
-
-Result<Places> placesIn(const std::vector<std::string_view>& header, const Lines& lines) {
+Result<Places> placesIn(const table::Table& rows) {
   Places places;
+  if (!rows.has_header && rows.columns.size() == kColumns.size()) {
+    for (std::size_t i = 0; i < kColumns.size(); ++i) places[i] = kOrderOfTum[i];
+    return places;
+  }
+  std::vector<const char*> names;
+  for (const PoseColumn& column : kColumns) names.push_back(column.name);
   for (std::size_t i = 0; i < kColumns.size(); ++i) {
-    const auto at = std::ranges::find(header, kColumns[i]);
-    if (at != header.end()) {
-      places[i] = static_cast<std::size_t>(at - header.begin());
-    } else if (i > 0) {
-      return lines.error(
-          fmt::format("the first line must name the columns; there is no {}, only: {}. Needed: {}; "
-                      "time_s may be left out",
-                      kColumns[i], fmt::join(header, ", "), fmt::join(kColumns, ", ")));
+    if (const auto at = rows.find(kColumns[i].name)) places[i] = *at;
+    for (std::size_t c = 0; c < rows.columns.size() && !places[i]; ++c) {
+      const table::TableColumn& column = rows.columns[c];
+      const bool is_it =
+          i == 0 ? isTime(column)
+                 : std::ranges::find(kColumns[i].written, plainName(column)) != kColumns[i].written.end();
+      if (is_it) places[i] = c;
     }
+    if (places[i] || i == 0) continue;
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}: no column is called {}, only: {}. Needed: {}; time_s may be left out",
+                             rows.file.string(), kColumns[i].name, fmt::join(rows.headers(), ", "),
+                             fmt::join(names, ", "))};
   }
   return places;
 }
 
-Result<double> numberOf(std::string_view field, std::string_view column, double most, const Lines& lines) {
-  double number = 0.0;
-  const auto [end, error] = std::from_chars(field.data(), field.data() + field.size(), number);
-  if (error != std::errc{} || end != field.data() + field.size())
-    return lines.error(fmt::format("{} = \"{}\" is not a number", column, field));
-  if (!std::isfinite(number))
-    return lines.error(fmt::format("{} = {} is not a finite number", column, field));
-  if (std::abs(number) > most)
-    return lines.error(fmt::format("{} = {} must be within ±{}", column, field, most));
-  return number;
+/// Seconds, or metres; of turns as they are.
+Result<std::vector<double>> valuesOf(const table::Table& rows, std::size_t column, std::size_t what) {
+  const table::TableColumn& from = rows.columns[column];
+  auto values = rows.numbers(column);
+  if (!values) return values;
+  const auto epoch = what == 0 && from.kind == table::Kind::Number && from.unit.empty()
+                         ? table::epochOf(*values, false)
+                         : std::nullopt;
+  const double factor = epoch                            ? epoch->seconds_per_unit
+                        : what == 0                      ? table::factorBetween(from.unit, "s")
+                        : what < 4 && !from.unit.empty() ? table::factorBetween(from.unit, "m")
+                                                         : 1.0;
+  for (double& value : *values) value *= factor;
+  for (std::size_t row = 0; row < rows.rows(); ++row) {
+    const double most = what == 0 ? kMostTime_s : kMostPosition_m;
+    if (!std::isfinite((*values)[row]))
+      return rows.errorAt(
+          column, row,
+          fmt::format("is not a finite number, and {} needs one in each row", kColumns[what].name));
+    if (std::abs((*values)[row]) > most)
+      return rows.errorAt(column, row,
+                          fmt::format("must be within ±{} {}", most,
+                                      what == 0  ? "s"
+                                      : what < 4 ? "m"
+                                                 : ""));
+  }
+  return values;
 }
 
-Result<sim::Motion::Key> poseOf(const std::vector<std::string_view>& fields, const Places& places,
-                                const Lines& lines) {
-  std::array<double, kColumns.size()> v{};
-  for (std::size_t i = 0; i < v.size(); ++i) {
-    if (!places[i]) continue;
-    if (*places[i] >= fields.size())
-      return lines.error(fmt::format("there are {} fields, so {} is missing", fields.size(), kColumns[i]));
-    const auto number =
-        numberOf(fields[*places[i]], kColumns[i], i == 0 ? kMostTime_s : kMostPosition_m, lines);
-    if (!number) return number.error();
-    v[i] = *number;
-  }
-  if (v[0] < 0.0)
-    return lines.error(fmt::format("time_s = {} must be 0 or more: it counts from device time 0", v[0]));
+Result<sim::Motion::Key> poseOf(const std::array<double, kColumns.size()>& v, const table::Table& rows,
+                                std::size_t row) {
+  const auto at = [&](const std::string& what) {
+    return Error{Error::Code::InvalidArgument,
+                 fmt::format("{}:{}: {}", rows.file.string(), rows.line[row], what)};
+  };
+  if (v[0] < 0.0) return at(fmt::format("time_s = {} must be 0 or more: it counts from device time 0", v[0]));
   const double length = std::sqrt(v[4] * v[4] + v[5] * v[5] + v[6] * v[6] + v[7] * v[7]);
-  if (!(length > 1e-6)) return lines.error("q_w, q_x, q_y, q_z are all zero, which is no rotation");
+  if (!(length > 1e-6)) return at("q_w, q_x, q_y, q_z are all zero, which is no rotation");
   return sim::Motion::Key{
       v[0], {v[4] / length, v[5] / length, v[6] / length, v[7] / length}, {v[1], v[2], v[3]}};
 }
@@ -112,28 +128,31 @@ Result<sim::Motion::Key> poseOf(const std::vector<std::string_view>& fields, con
 }  // namespace
 
 Result<Trajectory> loadTrajectoryCsv(const std::filesystem::path& file) {
-  std::error_code ignored;
-  if (!std::filesystem::is_regular_file(file, ignored))
-    return Error{Error::Code::NotFound, fmt::format("{}: there is no such file", file.string())};
-  Lines lines{file};
-  std::vector<std::string_view> fields;
-  if (!lines.isOpen() || !lines.next(fields))
-    return Error{Error::Code::InvalidArgument, fmt::format("{}: cannot be read, or is empty", file.string())};
-  const auto places = placesIn(fields, lines);
+  const auto rows = table::readTable(file);
+  if (!rows) return rows.error();
+  const auto places = placesIn(*rows);
   if (!places) return places.error();
+  std::array<std::vector<double>, kColumns.size()> columns;
+  for (std::size_t i = 0; i < kColumns.size(); ++i) {
+    auto values = (*places)[i] ? valuesOf(*rows, *(*places)[i], i) : std::vector<double>(rows->rows(), 0.0);
+    if (!values) return values.error();
+    columns[i] = *std::move(values);
+  }
   Trajectory trajectory{.poses = {}, .has_times = (*places)[0].has_value()};
-  while (lines.next(fields)) {
-    const auto pose = poseOf(fields, *places, lines);
+  for (std::size_t row = 0; row < rows->rows(); ++row) {
+    std::array<double, kColumns.size()> v{};
+    for (std::size_t i = 0; i < v.size(); ++i) v[i] = columns[i][row];
+    const auto pose = poseOf(v, *rows, row);
     if (!pose) return pose.error();
-    if (trajectory.has_times && !trajectory.poses.empty() &&
-        !(pose->time_s > trajectory.poses.back().time_s)) {
-      return lines.error(
-          fmt::format("time_s = {} is not later than that of the pose before, {}; sort the lines by time",
-                      pose->time_s, trajectory.poses.back().time_s));
+    if (trajectory.has_times && row > 0 && !(pose->time_s > trajectory.poses.back().time_s)) {
+      return Error{
+          Error::Code::InvalidArgument,
+          fmt::format(
+              "{}:{}: time_s = {} is not later than that of the pose before, {}; sort the lines by time",
+              file.string(), rows->line[row], pose->time_s, trajectory.poses.back().time_s)};
     }
     trajectory.poses.push_back(*pose);
   }
-  if (trajectory.poses.empty()) return lines.error("there are no poses below the columns' names");
   return trajectory;
 }
 

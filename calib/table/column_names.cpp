@@ -1,0 +1,40 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "calib/table/column_names.h"
+
+#include <algorithm>
+
+#include "calib/table/layout.h"
+#include "calib/table/records.h"
+
+namespace toftwin::table {
+
+std::vector<std::string> namesInComment(std::string_view comment, std::size_t width, char delimiter) {
+  for (const char one : {delimiter, ',', ';', '\t', '|', kBlanks}) {
+    const Records parts = splitRecords(comment, one);
+    if (parts.size() != 1 || parts.at(0).size() != width) continue;
+    const bool are_names = std::ranges::all_of(parts.at(0), [](std::string_view field) {
+      return lookOf(field) == Look::Text || lookOf(field) == Look::Nothing;
+    });
+    const bool has_name =
+        std::ranges::any_of(parts.at(0), [](std::string_view field) { return !field.empty(); });
+    if (are_names && has_name) return {parts.at(0).begin(), parts.at(0).end()};
+  }
+  return {};
+}
+
+std::vector<std::string> namesAtWideGaps(std::span<const std::string_view> fields, std::size_t width) {
+  if (fields.size() <= width || width == 0) return {};
+  const char* begin = fields.front().data();
+  const char* end = fields.back().data() + fields.back().size();
+  if (end < begin) return {};
+  std::string_view line{begin, static_cast<std::size_t>(end - begin)};
+  std::vector<std::string> names;
+  while (!line.empty()) {
+    const std::size_t gap = std::min(line.find("  "), line.size());
+    names.emplace_back(trimmed(line.substr(0, gap)));
+    line = trimmed(line.substr(gap));
+  }
+  return names.size() == width ? names : std::vector<std::string>{};
+}
+
+}  // namespace toftwin::table
