@@ -24,6 +24,7 @@ sim::Learned readLearned(settings::Table& table) {
   }
   sim::Learned learned;
   table.read(learned);
+  table.acceptAll();  // how sure it is and what it is for says discover, too
   if (const std::string problem = learned.problem(); !problem.empty()) {
     table.complain("", problem);
     return sim::Learned::none();
@@ -35,10 +36,9 @@ sim::Learned readLearned(settings::Table& table) {
   return learned;
 }
 
-std::string hashOf(const std::vector<sim::Learned>& effects) {
+std::string hashOf(const sim::Learned& sum) {
   std::string all;
-  for (const sim::Learned& effect : effects)
-    for (const std::string& text : effect.terms.texts()) all += text + "\n";
+  for (const std::string& text : sum.terms.texts()) all += text + "\n";
   return sim::contentHash(all).substr(0, 8);
 }
 
@@ -47,17 +47,22 @@ std::string hashOf(const std::vector<sim::Learned>& effects) {
 Result<std::shared_ptr<const LearnedCorrection>> readCorrection(const std::filesystem::path& file) {
   auto table = settings::Table::load(file);
   if (!table) return table.error();
-  std::vector<sim::Learned> effects;
+  // What was measured is what is true and the sum of all terms: one sum, whatever sections it stands in.
+  std::vector<terms::Term> all;
+  bool is_any = false;
   for (settings::Table& below : table->tables("effect")) {
-    effects.push_back(readLearned(below));
+    const sim::Learned learned = readLearned(below);
     if (auto checked = below.check(); !checked) return checked.error();
+    all.insert(all.end(), learned.terms.list().begin(), learned.terms.list().end());
+    is_any = true;
   }
-  if (effects.empty()) {
+  if (!is_any) {
     return Error{Error::Code::InvalidArgument,
                  fmt::format("{} has no [[effect]] of type = \"learned\": there is nothing to take off", file.string())};
   }
-  std::string name = fmt::format("{} ({})", file.filename().string(), hashOf(effects));
-  auto terms = sim::Correction::of(std::move(effects));
+  const sim::Learned sum{.title = {}, .terms = std::move(all)};
+  std::string name = fmt::format("{} ({})", file.filename().string(), hashOf(sum));
+  auto terms = sim::Correction::of({sum});
   if (!terms) return terms.error();
   return std::make_shared<const LearnedCorrection>(LearnedCorrection{*std::move(terms), std::move(name)});
 }

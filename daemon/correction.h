@@ -18,7 +18,7 @@ struct LearnedCorrection {
   std::string name;  ///< "model.toml (1a2b3c4d)": the file and the beginning of its terms' hash
 };
 
-/// Reads the [[effect]] tables of a file that `toftwin discover` wrote; other keys of it are of no matter. Errors name
+/// Reads the terms of all [[effect]] tables of a file that `toftwin discover` wrote, as one sum; other keys are of no matter. Errors name
 /// file, line and what cannot be taken off a camera's frames: effects that are not learned, terms that cannot be undone,
 /// covariates that no frame tells.
 Result<std::shared_ptr<const LearnedCorrection>> readCorrection(const std::filesystem::path& file);
