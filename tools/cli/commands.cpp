@@ -7,8 +7,8 @@ namespace toftwin::cli {
 
 std::span<const Command> commands() {
   static const std::array kCommands{
-      listCommand(),      infoCommand(),       grabCommand(),       recordCommand(),  replayCommand(),
-      poseCommand(),      rigCommand(),        setCommand(),        triggerCommand(), renderCommand(),
+      listCommand(),      infoCommand(),       grabCommand(),       recordCommand(),  replayCommand(), importCommand(),
+      poseCommand(),      rigCommand(),        setCommand(),        triggerCommand(), renderCommand(), sceneCommand(),
       calibrateCommand(), planCommand(),       measureCommand(),    compareCommand(), discoverCommand(), correctCommand(),
       suitCommand(),      logCommand(),        trendCommand(),      locateCommand(),  usbCommand(),
       doctorCommand(),    complianceCommand(), certificateCommand(), completionCommand(),

@@ -11,6 +11,7 @@
 #include "sim/sensor/sensor_model.h"
 #include "tools/cli/command.h"
 #include "tools/cli/describe.h"
+#include "tools/cli/file_kind.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
 
@@ -237,6 +238,18 @@ Result<Exit> run(const Options& options) {
   const std::filesystem::path path{options.what};
   if (path.extension() == ".mcap") return describeRecording(options);
   if (options.text) return printPreset(options.what);
+  // A file that is there is never taken for the name of a camera; a folder may well have that of one.
+  std::error_code fault;
+  const bool may_be_camera = std::filesystem::is_directory(path, fault) && options.what.find('/') == std::string::npos;
+  if (const auto kind = may_be_camera ? std::nullopt : kindOf(path)) {
+    if (kind->reader == FileKind::Reader::Recording) return describeRecording(options);
+    if (kind->reader == FileKind::Reader::Table) return describeCamera(options);
+    if (options.json)
+      fmt::print("{}", Json::object().set("file", options.what).set("kind", kind->text).text());
+    else
+      fmt::print("{}: {}\n", options.what, kind->text);
+    return Exit::Ok;
+  }
   if (path.extension() == ".toml" || options.what.starts_with(kPreset))
     return describeCamera(options);
   auto described = describeSource(options);
@@ -262,7 +275,8 @@ Command infoCommand() {
             const auto options = std::make_shared<Options>();
             args.option(
                     "WHAT", options->what,
-                    "name of a camera, a recording (.mcap), a camera file (.toml) or preset:NAME")
+                    "name of a camera, preset:NAME, or a file: of recordings (.mcap) and camera files (.toml) all that is known, of "
+                    "others what they are, by their content")
                 .required();
             args.flag("--json", options->json, "as JSON");
             args.flag("--text", options->text,
