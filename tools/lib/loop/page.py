@@ -61,7 +61,7 @@ def picture_row(toftwin, place, full):
     _, _, amplitude = frames.mean_image(toftwin, place["camera"], "amplitude")
     error = {what: pictures.errors(width, height, place[what], full) for what in ("before", "after", "noise")}
     caption = {"before": "Error before", "after": "Error after", "noise": "Noise alone"}
-    shown = [(pictures.brightness(width, height, amplitude), "What the camera sees", html.escape(place["name"]))]
+    shown = [(pictures.brightness(width, height, amplitude), "What the camera sees", html.escape(place["name"].split(": ", 1)[-1]))]
     shown += [(error[what], caption[what], f"<b>{frames.rms(place[what]):.1f} mm</b>") for what in caption]
     return "\n".join(f'<figure><img src="{source}" alt="{words}"><figcaption>{words}: {value}</figcaption></figure>'
                      for source, words, value in shown)
