@@ -9,9 +9,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
-#include "calib/compare/thesis_data.h"
 #include "calib/compare/live_report.h"
-#include "calib/compare/real_data.h"
 #include "protocol/types/counted.h"
 
 namespace toftwin::compare {
@@ -21,17 +19,6 @@ void add(Report& report, Finding finding) {
   for (Card& card : finding.cards) report.cards.push_back(std::move(card));
   report.data.set(finding.section.id, std::move(finding.data));
   report.sections.push_back(std::move(finding.section));
-}
-
-Section missingData(const CompareJob& job) {
-  return {.id = "real",
-          .title = "Real measurements",
-          .verdict = "Not compared: the folder tof-thesis-2018 was not found.",
-          .tone = Tone::Neutral,
-          .blocks = {Paragraph{fmt::format(
-              "Looked in {}. Name the folder that holds it with --data or in TOFTWIN_DATA.",
-              job.data->empty() ? "TOFTWIN_DATA and ../shared/data of the repository"
-                                : job.data->string())}}};
 }
 
 Result<> writeLog(const Capture& capture, const std::filesystem::path& folder) {
@@ -64,21 +51,6 @@ Result<> addLive(const CompareJob& job, Progress& progress, Report& report, std:
   return {};
 }
 
-Result<> addReal(const RealDataJob& job, Report& report, std::string& verdict) {
-  auto findings = judgeRealData(job);
-  if (!findings) return findings.error();
-  report.sections.push_back(summarySection(*findings));
-  std::string headlines;
-  for (Finding& finding : *findings) {
-    if (!finding.headline.empty()) headlines += (headlines.empty() ? "" : "; ") + finding.headline;
-    add(report, std::move(finding));
-  }
-  verdict += "Simulator against real measurements: " + headlines + ". ";
-  report.subtitle += std::string{report.subtitle.empty() ? "The" : "; the"} +
-                     " simulator against published measurements of a Kinect v2 and an O3D303";
-  return {};
-}
-
 std::string today() {
   const std::time_t now = std::time(nullptr);
   return fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(now));
@@ -94,29 +66,10 @@ Result<WrittenReport> compareAndReport(const CompareJob& job, Progress& progress
                  fmt::format("{}: cannot make the report's folder: {}", job.output.string(),
                              failed.message())};
   }
-  const auto folder = job.data ? findThesisData(*job.data) : std::nullopt;
-  const bool live = job.a != nullptr && job.b != nullptr;
-  if (!live && !folder) {
-    return Error{Error::Code::NotFound,
-                 "nothing to compare: no two sources are named, and no folder tof-thesis-2018 of "
-                 "real measurements is there (see --data)"};
-  }
-  if (live) planCapture(progress, job.capture);
-  if (folder) planRealData(progress, job.effort);
-
+  planCapture(progress, job.capture);
   Report report{.title = "Comparison of time-of-flight cameras"};
   std::string verdict;
-  if (live) {
-    if (auto done = addLive(job, progress, report, verdict); !done) return done.error();
-  }
-  if (folder) {
-    if (auto done = addReal({.folder = *folder, .effort = job.effort, .progress = &progress},
-                            report, verdict);
-        !done)
-      return done.error();
-  } else if (job.data) {
-    report.sections.push_back(missingData(job));
-  }
+  if (auto done = addLive(job, progress, report, verdict); !done) return done.error();
   progress.end();
   report.verdict = verdict;
   report.colophon = fmt::format("toftwin {}, {}{}{}", TOFTWIN_VERSION, today(),

@@ -4,7 +4,7 @@
 #include <toftwin/result.h>
 
 #include "calib/compare/capture.h"
-#include "calib/compare/real_data.h"
+#include "calib/compare/finding.h"
 
 namespace toftwin::compare {
 

@@ -8,7 +8,7 @@
 
 #include <toftwin/result.h>
 
-#include "calib/compare/real_data.h"
+#include "calib/compare/finding.h"
 #include "calib/compare/same_frames.h"
 #include "calib/plan/compare_run.h"
 #include "calib/plan/run_settings.h"

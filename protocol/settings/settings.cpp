@@ -214,7 +214,7 @@ std::vector<Table> Table::tables(std::string_view key) {
     all.push_back(Table{state_->descend(*one)});
     return all;
   }
-  if (const toml::array* array = node->as_array(); array != nullptr && array->is_array_of_tables()) {
+  if (const toml::array* array = node->as_array(); array != nullptr && (array->empty() || array->is_array_of_tables())) {
     for (const toml::node& element : *array) {
       all.push_back(Table{state_->descend(*element.as_table())});
     }

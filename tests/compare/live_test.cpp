@@ -156,7 +156,6 @@ TEST_F(Live, LeavesAPageItsNumbersAndALogWithIds) {
   CompareJob job{.a = &a,
                  .b = &b,
                  .capture = {.poses = twoPoses(), .frames = 2},
-                 .data = std::nullopt,
                  .output = folder / "report",
                  .note = "commit 1234"};
   const auto page = compareAndReport(job, silent);
@@ -339,28 +338,6 @@ TEST_F(Live, ACameraThatNeverReachesThePoseIsNamed) {
       capture(a, b, {.poses = {twoPoses()[1]}, .frames = 2, .most_skipped = 5}, silent);
   ASSERT_FALSE(captured.ok());
   EXPECT_THAT(captured.error().message, HasSubstr("fixed: none of 5 frames"));
-}
-
-TEST_F(Live, MissingMeasurementsAreSaidInTheReport) {
-  SourceFeed a{"a", sourceToml(1, 0.0)}, b{"b", sourceToml(2, 0.0)};
-  CompareJob job{.a = &a,
-                 .b = &b,
-                 .capture = {.poses = {}, .frames = 2},
-                 .data = folder / "nowhere",
-                 .output = folder / "report",
-                 .note = {}};
-  ASSERT_TRUE(compareAndReport(job, silent).ok());
-  std::ifstream in{folder / "report" / "index.html"};
-  EXPECT_THAT((std::string{std::istreambuf_iterator<char>{in}, {}}),
-              HasSubstr("tof-thesis-2018 was not found"));
-}
-
-TEST_F(Live, NothingToCompareIsAnError) {
-  CompareJob job{
-      .capture = {}, .data = folder / "nowhere", .output = folder / "report", .note = {}};
-  const auto page = compareAndReport(job, silent);
-  ASSERT_FALSE(page.ok());
-  EXPECT_THAT(page.error().message, HasSubstr("nothing to compare"));
 }
 
 TEST_F(Live, AnInterruptEndsTheCapture) {

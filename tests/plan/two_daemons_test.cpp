@@ -63,7 +63,7 @@ class TwoDaemons : public WithDaemon {
 };
 
 TEST_F(TwoDaemons, CompareWhatEachServesAlone) {
-  const Ran ran = run("compare cam twin --poses " + path("poses.toml") + " --frames 8 --no-data -o " +
+  const Ran ran = run("compare cam twin --poses " + path("poses.toml") + " --frames 8 -o " +
                       path("r") + both());
   ASSERT_EQ(ran.status, 0) << ran.err;
   // 2 poses × 432 pixels × 8 frames of two cameras with far less than 10 mm of noise.
@@ -88,12 +88,12 @@ TEST_F(TwoDaemons, CarryAPlanOutAndTheTwinFollowsFromTheOther) {
 
 TEST_F(TwoDaemons, SayWhichOneLacksTheSourceOrIsGone) {
   const Ran swapped =
-      run("compare twin cam --poses " + path("poses.toml") + " --no-data -o " + path("r") + both());
+      run("compare twin cam --poses " + path("poses.toml") + " -o " + path("r") + both());
   EXPECT_NE(swapped.status, 0);
   EXPECT_THAT(swapped.err, HasSubstr("no source \"twin\""));
   other_->end(SIGTERM);
   const Ran gone =
-      run("compare cam twin --poses " + path("poses.toml") + " --no-data -o " + path("r") + both());
+      run("compare cam twin --poses " + path("poses.toml") + " -o " + path("r") + both());
   EXPECT_EQ(gone.status, 3) << gone.err;
   EXPECT_THAT(gone.err, HasSubstr(otherSocket()));
 }

@@ -290,13 +290,13 @@ TEST_F(Recorded, ADamagedChunkIsFoundAlthoughTheIndexIsWhole) {
 }
 
 TEST_F(Recorded, AComparisonThatNeedsMoreFramesSaysSoFirst) {
-  const Ran ran = toftwin("compare kinect " + path("a.mcap") + "#kinect --frames 500 --no-data");
+  const Ran ran = toftwin("compare kinect " + path("a.mcap") + "#kinect --frames 500");
   EXPECT_EQ(ran.status, 4);
   EXPECT_THAT(ran.err, HasSubstr("has 15 frames, but 500 are needed"));
   EXPECT_THAT(ran.err, Not(HasSubstr("not whole")));
   const auto bytes = bytesOf(file_);
   record::writeBytes(file_, std::span{bytes}.first(bytes.size() / 2));
-  const Ran cut = toftwin("compare kinect " + path("a.mcap") + "#kinect --frames 500 --no-data");
+  const Ran cut = toftwin("compare kinect " + path("a.mcap") + "#kinect --frames 500");
   EXPECT_EQ(cut.status, 4);
   EXPECT_THAT(cut.err, HasSubstr("It is not whole: " + (folder_ / "a.mcap").string()));
 }

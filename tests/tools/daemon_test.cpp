@@ -168,7 +168,7 @@ TEST_F(WithDaemon, CtrlCBeforeAllFramesAreThereIsStatus130) {
 TEST_F(WithDaemon, OneSourceUnderTwoAddressesIsNotCompared) {
   const std::string link = (folder_ / "link").string();
   std::filesystem::create_symlink(socket(), link);
-  const Ran ran = run("compare pattern pattern --no-data -o " + path("r") + " --address-b unix:" + link);
+  const Ran ran = run("compare pattern pattern -o " + path("r") + " --address-b unix:" + link);
   EXPECT_EQ(ran.status, 4) << ran.out;
   EXPECT_THAT(ran.err, HasSubstr("the same source"));
 }
@@ -213,18 +213,18 @@ TEST_F(WithDaemon, ARecordingThatTheDaemonEndsIsWholeAndStatus3) {
 TEST_F(WithDaemon, APlaceThatCannotBeWrittenToIsStatus6) {
   EXPECT_EQ(run("record pattern -n 1 -o " + path("none/a.mcap")).status, 6);
   EXPECT_EQ(run("grab pattern -o " + path("none/a.png")).status, 6);
-  EXPECT_EQ(run("compare pattern short --frames 2 --no-data -o /dev/null/report").status, 6);
+  EXPECT_EQ(run("compare pattern short --frames 2 -o /dev/null/report").status, 6);
 }
 
 TEST_F(WithDaemon, AComparisonPutsTheCamerasBack) {
   std::ofstream{folder_ / "poses.toml"} << "[[pose]]\nposition_m = [0.0, 0.0, -2.0]\n";
   ASSERT_EQ(run("pose pattern --position 1,2,3").status, 0);
   const Ran compared = run("compare pattern short --poses " + path("poses.toml") +
-                           " --frames 2 --no-data -o " + path("report"));
+                           " --frames 2 -o " + path("report"));
   ASSERT_EQ(compared.status, 0) << compared.err;
   EXPECT_THAT(run("pose pattern").out, HasSubstr("position     1, 2, 3 m"));
   EXPECT_THAT(run("pose short").out, HasSubstr("position     0, 0, 0 m"));
-  EXPECT_EQ(run("compare pattern short --no-data --poses " + path("none.toml")).status, 4);
+  EXPECT_EQ(run("compare pattern short --poses " + path("none.toml")).status, 4);
 }
 
 TEST_F(WithDaemon, TheDaemonRecordsWhenAsked) {

@@ -21,7 +21,7 @@ class Rigged : public WithDaemon {
            "frame_rate_hz = 200\n";
   }
   Ran compare() {
-    return run("compare pattern twin --no-data --frames 2 --poses " + path("poses.toml") +
+    return run("compare pattern twin --frames 2 --poses " + path("poses.toml") +
                " --rig " + path("rig.toml") + " -o " + path("report"));
   }
   std::string log() {

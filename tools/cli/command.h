@@ -60,6 +60,7 @@ Command calibrateCommand();
 Command compareCommand();
 Command discoverCommand();
 Command correctCommand();
+Command validateCommand();
 Command suitCommand();
 Command locateCommand();
 Command planCommand();

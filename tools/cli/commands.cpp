@@ -10,8 +10,8 @@ std::span<const Command> commands() {
       listCommand(),      infoCommand(),       grabCommand(),       recordCommand(),  replayCommand(), importCommand(),
       poseCommand(),      rigCommand(),        setCommand(),        triggerCommand(), renderCommand(), sceneCommand(),
       calibrateCommand(), planCommand(),       measureCommand(),    compareCommand(), discoverCommand(), correctCommand(),
-      suitCommand(),      logCommand(),        trendCommand(),      locateCommand(),  usbCommand(),
-      doctorCommand(),    complianceCommand(), certificateCommand(), completionCommand(),
+      validateCommand(),  suitCommand(),       logCommand(),        trendCommand(),   locateCommand(),
+      usbCommand(),       doctorCommand(),     complianceCommand(), certificateCommand(), completionCommand(),
   };
   return kCommands;
 }

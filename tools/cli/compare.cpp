@@ -8,9 +8,7 @@
 #include <filesystem>
 #include <optional>
 
-#include "calib/compare/thesis_data.h"
 #include "calib/compare/follow.h"
-#include "calib/compare/real_data.h"
 #include "calib/plan/compare_run.h"
 #include "protocol/record/recording.h"
 #include "tools/cli/command.h"
@@ -28,9 +26,7 @@ constexpr const char* kExamples =
     "  toftwin compare kinect cam --address-b lab:47800 -o report     two daemons\n"
     "  toftwin compare kinect twin --poses poses.toml --rig rig.toml  a rig moves the real one\n"
     "  toftwin compare run -o report                                  what toftwin measure captured\n"
-    "  toftwin compare --table drift.csv --kind drift -o report       a measured or published series\n"
-    "  toftwin compare --data ../shared/data -o report                the simulator and real "
-    "measurements\n";
+    "  toftwin compare --table drift.csv --kind drift -o report       a measured or published series\n";
 
 struct Options {
   DaemonOptions daemon, daemon_b;
@@ -38,13 +34,10 @@ struct Options {
   std::vector<std::string> sources;
   std::string poses;
   std::string rig;
-  std::string data;
   std::string output = "report";
   std::string note, log, twin = "auto";
   int frames = 30;
   double frame_timeout_s = 120.0;
-  double effort = 1.0;
-  bool no_data = false;
   bool locked = false;
 
   /// One name, of a folder: a run of `toftwin measure`.
@@ -163,8 +156,6 @@ Result<compare::CompareJob> jobOf(const Options& options) {
   job.capture.timeout =
       std::chrono::milliseconds{static_cast<std::int64_t>(options.frame_timeout_s * 1000.0)};
   job.capture.interrupted = interrupted;
-  if (!options.no_data) job.data = options.data;
-  job.effort = options.effort;
   job.output = options.output;
   job.note = options.note;
   return job;
@@ -211,26 +202,18 @@ Result<Exit> compareThem(const Options& options) {
     carrier = *std::move(opened);
     job->capture.carrier = carrier.get();
   }
-  if (!options.sources.empty()) {
-    const auto needed = static_cast<std::uint64_t>(options.frames) *
-                        std::max<std::uint64_t>(1, job->capture.poses.size());
-    for (const std::string& name : options.sources) {
-      if (!isRecording(name)) continue;
-      if (auto checked = checkLength(name, needed); !checked) return checked.error();
-    }
-    if (auto opened = openBoth(options, a, b); !opened) return opened.error();
-    job->a = a.feed.get();
-    job->b = b.feed.get();
-    job->capture.twin = twinFrom(options.twin, *a.feed, *b.feed);
+  const auto needed = static_cast<std::uint64_t>(options.frames) * std::max<std::uint64_t>(1, job->capture.poses.size());
+  for (const std::string& name : options.sources) {
+    if (!isRecording(name)) continue;
+    if (auto checked = checkLength(name, needed); !checked) return checked.error();
   }
+  if (auto opened = openBoth(options, a, b); !opened) return opened.error();
+  job->a = a.feed.get();
+  job->b = b.feed.get();
+  job->capture.twin = twinFrom(options.twin, *a.feed, *b.feed);
   compare::Progress progress{stderr};
   const auto written = compare::compareAndReport(*job, progress);
   if (!written) return written.error();
-  if (job->data && !compare::findThesisData(*job->data)) {
-    fmt::print(stderr,
-               "The real measurements were left out: there is no tof-thesis-2018 in $TOFTWIN_DATA "
-               "nor in ../shared/data; see --data.\n");
-  }
   tell(*written);
   return Exit::Ok;
 }
@@ -244,8 +227,7 @@ Run add(Arguments& args) {
       .valid(isAddress);
   args.option("sources", options->sources,
               "A and B: names of sources, or recordings (FILE.mcap, FILE.mcap#SOURCE if it "
-              "holds several); or the folder of one run of toftwin measure; none: only the "
-              "simulator against real measurements")
+              "holds several); or the folder of one run of toftwin measure")
       .values(0, 2);
   args.option(
       "--poses", options->poses,
@@ -267,13 +249,6 @@ Run add(Arguments& args) {
   args.option("--frame-timeout", options->frame_timeout_s, "seconds to wait for one frame")
       .within(0.1, 86'400.0)
       .showsDefault();
-  args.option("--data", options->data,
-              "folder that holds tof-thesis-2018; default: $TOFTWIN_DATA, else ../shared/data "
-              "of the repository");
-  args.flag("--no-data", options->no_data, "leave the real measurements out");
-  args.option("--effort", options->effort, "factor on the paths traced for the real measurements")
-      .within(0.01, 100.0)
-      .showsDefault();
   args.flag("--locked", options->locked,
             "of a run: judge on the captures that were held back, which can be done once");
   args.option("--log", options->log,
@@ -282,23 +257,18 @@ Run add(Arguments& args) {
   args.option("-o,--output", options->output, "folder of the report").showsDefault();
   args.option("--note", options->note, "for the report's foot, such as a commit");
   args.check([options]() -> Result<> {
-    if (!options->data.empty() && !options->no_data && !compare::findThesisData(options->data)) {
-      return Error{Error::Code::InvalidArgument,
-                   fmt::format("--data {}: there is no folder tof-thesis-2018 in it, nor is it one",
-                               options->data)};
-    }
     if (auto checked = options->tables.check(); !checked) return checked;
     if (options->tables.areGiven() &&
-        (!options->sources.empty() || !options->poses.empty() || !options->data.empty())) {
+        (!options->sources.empty() || !options->poses.empty())) {
       return Error{Error::Code::InvalidArgument,
-                   "--table is judged by itself: without sources, --poses and --data"};
+                   "--table is judged by itself: without sources and --poses"};
     }
     if (isRefused(*options)) return sameTwice(options->sources[0]);
-    const bool is_live = !options->poses.empty() || !options->rig.empty() || !options->data.empty() ||
+    const bool is_live = !options->poses.empty() || !options->rig.empty() ||
                          !options->daemon_b.address.empty();
     if (options->isRun() && is_live) {
       return Error{Error::Code::InvalidArgument,
-                   "a run is compared as it was captured: --poses, --rig, --data and --address-b mean nothing for it"};
+                   "a run is compared as it was captured: --poses, --rig and --address-b mean nothing for it"};
     }
     if (!options->log.empty() && !options->isRun()) {
       return Error{Error::Code::InvalidArgument, "--log is for the folder of a run"};
@@ -306,17 +276,16 @@ Run add(Arguments& args) {
     if (options->locked && !options->isRun()) {
       return Error{Error::Code::InvalidArgument, "--locked is for the folder of a run"};
     }
-    if (options->isRun()) return {};
+    if (options->isRun() || options->tables.areGiven()) return {};
     if (!options->rig.empty() && (options->poses.empty() || options->sources.size() != 2)) {
       return Error{Error::Code::InvalidArgument, "--rig is for two sources and --poses"};
     }
-    if (options->sources.size() != 1) return {};
-    return Error{
-        Error::Code::InvalidArgument,
-        fmt::format(
-            "name two sources, A and B, the folder of a run, or none to judge the simulator only; there is "
-            "no folder {}",
-            options->sources[0])};
+    if (options->sources.size() == 2) return {};
+    return Error{Error::Code::InvalidArgument,
+                 options->sources.empty()
+                     ? "name two sources, A and B, or the folder of a run. The simulator against measured data: toftwin validate"
+                     : fmt::format("name two sources, A and B, or the folder of a run; there is no folder {}",
+                                   options->sources[0])};
   });
   return [options] { return compareThem(*options); };
 }
@@ -326,7 +295,7 @@ Run add(Arguments& args) {
 Command compareCommand() {
   using namespace compare_command;
   return {"compare",
-          "compare two cameras, and the simulator with real measurements, and leave a report",
+          "compare two cameras and leave a report",
           kExamples, add};
 }
 
