@@ -3,7 +3,6 @@
 #include <tiny_gltf.h>
 
 #include <algorithm>
-#include <ranges>
 #include <unordered_map>
 
 #include "sim/meshes/faces.h"
@@ -57,7 +56,8 @@ class GltfReader {
   /// Nodes from the roots down, without recursion: a chain of them may be long.
   Result<MeshFile> read() {
     std::vector<Pending> pending;  // the next one is the last
-    for (const std::vector<int> all = roots(); const int root : all | std::views::reverse) pending.push_back({root, {}});
+    const std::vector<int> all = roots();
+    for (auto root = all.rbegin(); root != all.rend(); ++root) pending.push_back({*root, {}});
     while (!pending.empty()) {
       if (stop_.stop_requested()) return askedToStop();
       const Pending next = pending.back();
@@ -70,7 +70,7 @@ class GltfReader {
       const tinygltf::Node& node = model_.nodes[number];
       const Placement placement = next.world_from_parent.after(placementOf(node));
       if (auto added = addNode(node, number, placement); !added) return added.error();
-      for (const int child : node.children | std::views::reverse) pending.push_back({child, placement});
+      for (auto child = node.children.rbegin(); child != node.children.rend(); ++child) pending.push_back({*child, placement});
     }
     if (!read_.mesh.places.empty()) read_.mesh.places.resize(read_.mesh.triangles.size(), kNoPlaces);
     if (!model_.animations.empty()) read_.notes.push_back("its animations are left out");

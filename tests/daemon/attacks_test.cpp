@@ -56,11 +56,11 @@ TEST_F(Attack, AStalledClientOfSixteenLosslessStreamsTakesNoFrameFromARecording)
   for (std::uint64_t id = 2; id < 18; ++id) stalled->send(wish(id, wire::Policy::Lossless, 1));
   auto stream = bystander->subscribe("cam", {.planes = {PlaneKind::Flags}, .policy = Policy::Queue, .queue = 500});
   ASSERT_TRUE(stream.ok()) << stream.error().message;
-  std::uint64_t dropped = 0;
+  std::uint64_t dropped = 0, seen = 0;
   for (int i = 0; i < 300; ++i) {
     const auto frame = stream->next(kSoon);
     ASSERT_TRUE(frame.ok()) << frame.error().message;
-    dropped += frame->dropped_before;
+    dropped += frame->dropped_before, seen = frame->sequence;
   }
   EXPECT_EQ(dropped, 0u);
   const auto recorded = bystander->stopRecording("cam");
@@ -74,7 +74,7 @@ TEST_F(Attack, AStalledClientOfSixteenLosslessStreamsTakesNoFrameFromARecording)
     }
     last = frame->sequence;
   }
-  EXPECT_GE(last.value_or(0), 300u);
+  EXPECT_GE(last.value_or(0), seen);  // counted from 0
 }
 
 TEST_F(Attack, ALockstepThatIsNeverAcknowledgedLetsTheSourceGoOnForOthers) {
