@@ -69,7 +69,7 @@ TEST(Toftwin, AWrongCommandLineIsStatus2AndSaysWhatIsWrong) {
            {"list -a localhost:99999", "99999"},
            {"info kinect --text", "--text goes with preset:NAME"},
            {"compare kinect kinect", "the same source"},
-           {"compare --data /no/such", "/no/such"},
+           {"compare --data /no/such", "--data"},
            {"compare kinect", "name two sources"},
            {"pose kinect --position 1,2", "--position"}}) {
     const Ran ran = toftwin(arguments);
