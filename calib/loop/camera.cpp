@@ -106,6 +106,8 @@ Result<MendedCamera> cameraWith(const Discovery& d, const CameraText& camera) {
   }
   MendedCamera out{.toml = camera.text};
   if (!out.toml.ends_with('\n')) out.toml += '\n';
+  // All in one section: sections act one after the other, and each would see the error of those before it as range.
+  std::vector<std::string> all;
   for (const LearnedEffect& effect : d.model.effects) {
     std::vector<std::string> texts;
     bool is_whole = true;
@@ -115,9 +117,10 @@ Result<MendedCamera> cameraWith(const Discovery& d, const CameraText& camera) {
       if (known) texts.push_back(settings::toToml(terms::toText(*known)));
     }
     // Half of an effect is another one.
-    if (!is_whole || texts.empty()) continue;
-    out.toml += fmt::format("\n[[effect]]\ntype = \"learned\"\ntitle = {}\nterms = [{}]\n", settings::toToml(effect.title), fmt::join(texts, ", "));
+    if (is_whole) all.insert(all.end(), texts.begin(), texts.end());
   }
+  if (!all.empty())
+    out.toml += fmt::format("\n[[effect]]\ntype = \"learned\"\ntitle = {}\nterms = [\n  {},\n]\n", settings::toToml("learned from " + d.model.data), fmt::join(all, ",\n  "));
   if (auto parsed = sim::SensorModel::parse(out.toml, "camera.toml"); !parsed) return parsed.error();
   return out;
 }

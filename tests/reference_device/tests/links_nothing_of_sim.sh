@@ -1,7 +1,9 @@
 #!/bin/bash
 # SPDX-License-Identifier: Apache-2.0
-# The first program holds no symbol of the simulator; the second does, or else this looks for the wrong thing.
-count() { nm -C "$1" | grep -c 'toftwin::sim::\|rtcNewScene'; }
+# The first program holds no symbol of what simulates a camera (scenes, tracers, sensors, decoders); the second does, or else this
+# looks for the wrong thing. The daemon's own code takes learned errors off any camera, and with that come the effects' symbols.
+simulates='toftwin::sim::\(SensorModel\|Scene\|RealtimeTracer\|Tracer\|Simulator\|correlate\|decode\)\|rtcNewScene'
+count() { nm -C "$1" | grep -c "$simulates"; }
 symbols=$(nm "$1" | wc -l)
 own=$(count "$1") other=$(count "$2")
 echo "$1: $own of $symbols symbols are the simulator's; $2: $other"
