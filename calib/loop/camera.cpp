@@ -2,11 +2,7 @@
 #include "calib/loop/camera.h"
 
 #include <algorithm>
-#include <array>
-#include <filesystem>
-#include <fstream>
 #include <optional>
-#include <sstream>
 #include <string_view>
 
 #include <fmt/format.h>
@@ -19,14 +15,6 @@
 
 namespace toftwin::loop {
 namespace {
-
-Result<std::string> textOf(const std::filesystem::path& file) {
-  std::ifstream in{file, std::ios::binary};
-  std::ostringstream text;
-  if (in) text << in.rdbuf();
-  if (in) return text.str();
-  return Error{Error::Code::NotFound, fmt::format("{}: cannot be read", file.string())};
-}
 
 /// What the simulator calls a column, and its unit there.
 struct Meant {
@@ -83,20 +71,6 @@ std::optional<terms::Term> translated(const Discovery& d, terms::Term term, std:
 }
 
 }  // namespace
-
-Result<CameraText> loadCamera(const std::string& model) {
-  constexpr std::string_view kPreset = "preset:";  // as `toftwin info` has it
-  const auto names = sim::SensorModel::presetNames();
-  const std::string name = model.starts_with(kPreset) ? model.substr(kPreset.size()) : model;
-  const bool is_preset = std::ranges::find(names, name) != names.end();
-  auto text = is_preset ? sim::SensorModel::presetText(name) : textOf(model);
-  if (!text) {
-    return Error{text.error().code, fmt::format("{}; --model takes a camera file or one of the presets {}", text.error().message, fmt::join(names, ", "))};
-  }
-  auto parsed = sim::SensorModel::parse(*text, is_preset ? name + ".toml" : model);
-  if (!parsed) return parsed.error();
-  return CameraText{*std::move(parsed), *std::move(text)};
-}
 
 Result<MendedCamera> cameraWith(const Discovery& d, const CameraText& camera) {
   if (d.readings.unit != "mm") {

@@ -6,18 +6,10 @@
 
 #include <toftwin/result.h>
 
+#include "calib/loop/camera_text.h"
 #include "calib/loop/discovery.h"
-#include "sim/sensor/sensor_model.h"
 
 namespace toftwin::loop {
-
-/// A camera as a file says it, with the text that is to be mended.
-struct CameraText {
-  sim::SensorModel model;
-  std::string text{};
-};
-/// `model`: a file, or a preset's name with "preset:" before it or without. Errors: neither is there, or it is no camera.
-Result<CameraText> loadCamera(const std::string& model);
 
 /// The camera with what was found in a table, each effect a section of its own, and what could not be taken over.
 struct MendedCamera {

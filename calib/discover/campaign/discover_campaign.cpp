@@ -8,7 +8,7 @@
 
 #include <fmt/format.h>
 
-#include "calib/discover/camera_text.h"
+#include "calib/loop/camera_text.h"
 #include "calib/discover/campaign/before_search.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/found_model.h"
@@ -44,7 +44,7 @@ struct DeclaredFiles {
 #pragma GCC diagnostic push
 #pragma GCC diagnostic ignored "-Wmaybe-uninitialized"
 Result<DeclaredFiles> loadDeclared(const CampaignJob& job) {
-  auto camera = loadCamera(job.model);
+  auto camera = loop::loadCamera(job.model);
   if (!camera) return camera.error();
   auto scene = sim::Scene::load(job.scene);
   if (!scene) return scene.error();

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calib/discover/camera_text.h"
+#include "calib/loop/camera_text.h"
 
 #include <algorithm>
 #include <filesystem>
@@ -10,7 +10,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-namespace toftwin::discover {
+namespace toftwin::loop {
 namespace {
 
 Result<std::string> textOf(const std::filesystem::path& file) {
@@ -38,4 +38,4 @@ Result<CameraText> loadCamera(const std::string& model) {
   return CameraText{*std::move(parsed), *std::move(text)};
 }
 
-}  // namespace toftwin::discover
+}  // namespace toftwin::loop

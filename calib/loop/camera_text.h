@@ -7,7 +7,7 @@
 
 #include "sim/sensor/sensor_model.h"
 
-namespace toftwin::discover {
+namespace toftwin::loop {
 
 /// A camera as a file says it, with the text that is to be mended.
 struct CameraText {
@@ -17,4 +17,4 @@ struct CameraText {
 /// `model`: a file, or a preset's name with "preset:" before it or without. Errors: neither is there, or it is no camera.
 Result<CameraText> loadCamera(const std::string& model);
 
-}  // namespace toftwin::discover
+}  // namespace toftwin::loop
