@@ -56,33 +56,18 @@ std::vector<Eigen::Index> without(const Eigen::Index count, const std::vector<No
 
 // ---- The three responses -------------------------------------------------------------------------------------------
 
-/// Of many rows as many as show what there is, in the file's order; steps between them that differ do not alias a period.
-Evidence thinned(const Evidence& all) {
-  if (all.rows() <= kSearched) return all;
-  std::vector<Eigen::Index> rows;
-  const Eigen::Index every = all.rows() / kSearched + 1;
-  for (Eigen::Index i = 0; i < all.rows(); i += 1 + (i * 2654435761LL >> 7) % (2 * every - 1)) rows.push_back(i);
-  return rowsOf(all, rows);
-}
-
 /// Coefficients by all rows, of effects whose shapes were found in some.
 void fitByAll(Evidence& e, Explanation& explanation) {
   if (explanation.effects.empty()) return;
   const LeastSquares fit = robustLeastSquares(e, e.y, columnsOf(e, explanation.effects));
   const Eigen::VectorXd z = fit.residual.cwiseQuotient(e.sigma);
   const double variance = z.squaredNorm() / std::max(1.0, static_cast<double>(e.rows() - fit.coefficient.size()));
-  Eigen::Index at = 0;
-  for (Effect& effect : explanation.effects) {
-    const auto k = static_cast<Eigen::Index>(effect.shape.columns.size());
-    effect.coefficient = fit.coefficient.segment(at, k);
-    effect.covariance = variance * fit.covariance.block(at, at, k, k);
-    at += k;
-  }
+  takeNumbers(explanation.effects, fit, variance);
 }
 
 Explanation explained(Evidence& e, const ExplainOptions& options) {
   if (e.rows() <= kSearched) return explain(e, options);
-  Evidence some = thinned(e);
+  Evidence some = rowsOf(e, thinned(e.rows(), kSearched));
   Explanation explanation = explain(some, options);
   fitByAll(e, explanation);
   return explanation;

@@ -78,6 +78,13 @@ Evidence rowsOf(const Evidence& all, std::span<const Eigen::Index> rows) {
   return part;
 }
 
+std::vector<Eigen::Index> thinned(Eigen::Index rows, Eigen::Index most) {
+  const Eigen::Index every = rows <= most ? 1 : rows / most + 1;
+  std::vector<Eigen::Index> some;
+  for (Eigen::Index i = 0; i < rows; i += 1 + (i * 2654435761LL >> 7) % (2 * every - 1)) some.push_back(i);
+  return some;
+}
+
 void block(Evidence& evidence, Eigen::Index length, int most) {
   const Eigen::Index n = evidence.rows();
   const Eigen::Index least = std::max<Eigen::Index>(length, (n + most - 1) / most);

@@ -63,6 +63,10 @@ struct Evidence {
 /// The rows whose numbers are given, in that order.
 Evidence rowsOf(const Evidence& all, std::span<const Eigen::Index> rows);
 
+/// Numbers of about `most` of so many rows, all if they are no more, in their order. Steps between them that differ do not alias a
+/// short period of the rows.
+std::vector<Eigen::Index> thinned(Eigen::Index rows, Eigen::Index most);
+
 /// Gives the blocks: at most `most` of them, of rows that follow each other within a group, none shorter than `length`.
 void block(Evidence& evidence, Eigen::Index length, int most);
 

@@ -3,10 +3,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <set>
 
 #include "calib/linear/linear.h"
 #include "calib/loop/noise.h"
+#include "calib/loop/projection.h"
 #include "calib/loop/wander.h"
 
 namespace toftwin::loop {
@@ -16,14 +16,6 @@ namespace {
 constexpr std::size_t kShortlist = 3;
 /// Blocks: enough that signs of a hundred of them are a distribution.
 constexpr int kMostBlocks = 150;
-
-double spreadOf(const Eigen::VectorXd& v) { return std::sqrt((v.array() - v.mean()).square().mean()); }
-
-Eigen::MatrixXd joined(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
-  Eigen::MatrixXd both(a.rows(), a.cols() + b.cols());
-  both << a, b;
-  return both;
-}
 
 /// The search's state: evidence, what was found, and what all of that leaves.
 class Search {
@@ -65,7 +57,7 @@ class Search {
   [[nodiscard]] Eigen::MatrixXd modelWithout(std::size_t which) const {
     Eigen::MatrixXd all(evidence_.rows(), 0);
     for (std::size_t i = 0; i < out_.effects.size(); ++i)
-      if (i != which) all = joined(all, columnsOf(evidence_, out_.effects[i].shape.columns));
+      if (i != which) all = sideBySide(all, columnsOf(evidence_, out_.effects[i].shape.columns));
     return all;
   }
   [[nodiscard]] Eigen::MatrixXd model() const { return modelWithout(out_.effects.size()); }
@@ -83,7 +75,7 @@ class Search {
         const double step = move == 's' ? 1e-3 * inner[i] : 1e-3 * evidence_.find(effect.shape.covariates.front())->span();
         inner[i] += step;
         const Eigen::MatrixXd beside = columnsOf(evidence_, moved(effect.shape, evidence_, inner).columns);
-        if (beside.allFinite()) all = joined(all, (beside - at) / step);
+        if (beside.allFinite()) all = sideBySide(all, (beside - at) / step);
       }
     }
     return all;
@@ -106,14 +98,9 @@ class Search {
   /// The parts of what was found over single covariates.
   [[nodiscard]] std::vector<Hint> hints() const {
     std::vector<Hint> all;
-    for (const Effect& effect : out_.effects) {
-      std::size_t at = 0;
-      for (const Family* family : effect.shape.families) {
-        const auto from = effect.shape.inner.begin() + static_cast<std::ptrdiff_t>(at);
-        at += family->moves.size();
-        if (family->arguments == 1) all.push_back({family->name, effect.shape.covariates.front(), {from, from + static_cast<std::ptrdiff_t>(family->moves.size())}});
-      }
-    }
+    for (const Effect& effect : out_.effects)
+      for (const Part& part : partsOf(effect.shape))
+        if (part.family->arguments == 1) all.push_back({part.family->name, effect.shape.covariates.front(), part.inner});
     return all;
   }
 
@@ -199,7 +186,7 @@ class Search {
         if (product.size() == 2 && std::ranges::find(alone, Product{factor}) == alone.end()) alone.push_back({factor});
     if (alone.empty()) return true;
     Folds folds{evidence_, evidence_.y, weight_, scale_};
-    folds.share(joined(beside, columnsOf(evidence_, alone)));
+    folds.share(sideBySide(beside, columnsOf(evidence_, alone)));
     const auto gain = folds.with(columnsOf(evidence_, shape.columns)).over(folds.with(Eigen::MatrixXd(evidence_.rows(), 0)));
     return gain.mean > std::max(shape.price, 2.0 * gain.error);
   }
@@ -213,7 +200,7 @@ class Search {
       const Eigen::VectorXd left = leastSquares(evidence_, evidence_.y, weight_, columns).residual.cwiseQuotient(evidence_.sigma) / scale_;
       return fitWander(left.cwiseMin(8.0).cwiseMax(-8.0), evidence_.group).likelihood;
     };
-    const double more = likelihood(joined(beside, columnsOf(evidence_, shape.columns))) - likelihood(beside);
+    const double more = likelihood(sideBySide(beside, columnsOf(evidence_, shape.columns))) - likelihood(beside);
     return more - shape.price - shape.numbers() - kClear;
   }
 
@@ -234,14 +221,14 @@ class Search {
     const bool goes_with_lines = std::ranges::any_of(chosen.shape.covariates, [&](const std::string& name) { return evidence_.find(name)->goes_with_lines; });
     if (goes_with_lines) return chosen.gain.mean < kClear * chosen.gain.error && shareThatGains(chosen, beside) < kMostGain;
     Folds folds{evidence_, evidence_.y, weight_, scale_};
-    const HeldOut without = folds.with(beside), with = folds.with(joined(beside, columnsOf(evidence_, chosen.shape.columns)));
+    const HeldOut without = folds.with(beside), with = folds.with(sideBySide(beside, columnsOf(evidence_, chosen.shape.columns)));
     const auto gain = folds.wandering(with).over(folds.wandering(without));
     return gain.mean < std::max(chosen.shape.price, gain.error);
   }
 
   [[nodiscard]] Eigen::VectorXd curveOf(const Shape& shape, const Eigen::MatrixXd& beside) const {
     const Eigen::MatrixXd x = columnsOf(evidence_, shape.columns);
-    const auto fit = leastSquares(evidence_, evidence_.y, weight_, joined(beside, x));
+    const auto fit = leastSquares(evidence_, evidence_.y, weight_, sideBySide(beside, x));
     return x * fit.coefficient.tail(x.cols());
   }
 
@@ -298,13 +285,7 @@ class Search {
     const LeastSquares fit = leastSquares(evidence_, evidence_.y, weight_, model());
     const double freedom = std::max(1.0, static_cast<double>(evidence_.rows() - model().cols() - evidence_.groups()));
     const double variance = (out_.residual.array().square() * weight_.array()).sum() / freedom;
-    Eigen::Index at = 0;
-    for (Effect& effect : out_.effects) {
-      const auto k = static_cast<Eigen::Index>(effect.shape.columns.size());
-      effect.coefficient = fit.coefficient.segment(at, k);
-      effect.covariance = variance * fit.covariance.block(at, at, k, k);
-      at += k;
-    }
+    takeNumbers(out_.effects, fit, variance);
   }
 
   Evidence& evidence_;
@@ -318,8 +299,18 @@ class Search {
 
 Eigen::MatrixXd columnsOf(const Evidence& evidence, const std::vector<Effect>& effects) {
   Eigen::MatrixXd all(evidence.rows(), 0);
-  for (const Effect& effect : effects) all = joined(all, columnsOf(evidence, effect.shape.columns));
+  for (const Effect& effect : effects) all = sideBySide(all, columnsOf(evidence, effect.shape.columns));
   return all;
+}
+
+void takeNumbers(std::vector<Effect>& effects, const LeastSquares& fit, double variance) {
+  Eigen::Index at = 0;
+  for (Effect& effect : effects) {
+    const auto k = static_cast<Eigen::Index>(effect.shape.columns.size());
+    effect.coefficient = fit.coefficient.segment(at, k);
+    effect.covariance = variance * fit.covariance.block(at, at, k, k);
+    at += k;
+  }
 }
 
 Explanation explain(Evidence& evidence, const ExplainOptions& options) { return Search{evidence, options}.run(); }

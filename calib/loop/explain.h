@@ -53,6 +53,9 @@ struct Explanation {
 /// rows, choose all shapes anew beside it, drop what became useless, and again.
 Explanation explain(Evidence& evidence, const ExplainOptions& options);
 
+/// Coefficients and their covariance, of a fit over all effects' columns. `variance`: of the noise, in units of the fit's weights.
+void takeNumbers(std::vector<Effect>& effects, const LeastSquares& fit, double variance);
+
 /// All effects' columns, in their order.
 Eigen::MatrixXd columnsOf(const Evidence& evidence, const std::vector<Effect>& effects);
 

@@ -392,17 +392,22 @@ Shape sumOf(const Shape& a, const Shape& b) {
   return sum;
 }
 
+std::vector<Part> partsOf(const Shape& shape) {
+  std::vector<Part> parts;
+  auto from = shape.inner.begin();
+  for (const Family* family : shape.families) {
+    const auto to = from + static_cast<std::ptrdiff_t>(family->moves.size());
+    parts.push_back({family, {from, to}});
+    from = to;
+  }
+  return parts;
+}
+
 Shape moved(const Shape& shape, const Evidence& evidence, const Inner& inner) {
   std::vector<const Covariate*> arguments;
   for (const std::string& name : shape.covariates) arguments.push_back(evidence.find(name));
   Shape sum{.covariates = shape.covariates};
-  std::size_t at = 0;
-  for (const Family* family : shape.families) {
-    const auto from = inner.begin() + static_cast<std::ptrdiff_t>(at);
-    const Shape one = shapeOf(*family, arguments, {from, from + static_cast<std::ptrdiff_t>(family->moves.size())});
-    sum = sumOf(sum, one);
-    at += family->moves.size();
-  }
+  for (const Part& part : partsOf({.families = shape.families, .inner = inner})) sum = sumOf(sum, shapeOf(*part.family, arguments, part.inner));
   sum.price = shape.price;
   return sum;
 }

@@ -59,6 +59,12 @@ struct Shape {
   [[nodiscard]] bool has(std::string_view family) const;
 };
 Shape shapeOf(const Family& family, Arguments arguments, Inner inner);
+/// Its families, each with the inner numbers that are its own.
+struct Part {
+  const Family* family = nullptr;
+  Inner inner{};
+};
+std::vector<Part> partsOf(const Shape& shape);
 /// The sum of two over the same covariates.
 Shape sumOf(const Shape& a, const Shape& b);
 /// The same with other inner numbers.

@@ -89,9 +89,4 @@ HeldOut Folds::wandering(const HeldOut& held) const {
   return out;
 }
 
-HeldOut holdOut(const Evidence& evidence, const Eigen::VectorXd& y, const Eigen::VectorXd& weight,
-                const Eigen::MatrixXd& columns, double scale) {
-  return Folds{evidence, y, weight, scale}.with(columns);
-}
-
 }  // namespace toftwin::loop

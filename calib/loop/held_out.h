@@ -20,12 +20,8 @@ struct HeldOut {
   [[nodiscard]] Gain over(const HeldOut& worse) const;
 };
 
-/// Ten folds of whole blocks. Groups' offsets are known from all of their rows, so that only what happens within groups counts.
-/// `scale`: deviation of the noise in units of sigma.
-HeldOut holdOut(const Evidence& evidence, const Eigen::VectorXd& y, const Eigen::VectorXd& weight,
-                const Eigen::MatrixXd& columns, double scale);
-
-/// Columns of several models over the same rows, of which most are the same, share this.
+/// Ten folds of whole blocks, for several models over the same rows. Groups' offsets are known from all of their rows, so that only
+/// what happens within groups counts. `scale`: deviation of the noise in units of sigma.
 class Folds {
  public:
   Folds(const Evidence& evidence, const Eigen::VectorXd& y, const Eigen::VectorXd& weight, double scale);

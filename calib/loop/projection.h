@@ -34,6 +34,10 @@ Eigen::VectorXd robustWeights(const Eigen::VectorXd& residual, const Eigen::Vect
 double robustScale(const Eigen::VectorXd& residual);
 double robustScale(std::vector<double> values);
 double median(std::vector<double> values);
+/// Standard deviation about the mean.
+double spreadOf(const Eigen::VectorXd& values);
+/// The columns of both side by side.
+Eigen::MatrixXd sideBySide(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
 /// Coefficients of the least weighted squares of y over these columns beside groups' offsets, and what is left.
 struct LeastSquares {

@@ -8,6 +8,7 @@
 
 #include "calib/loop/grammar.h"
 #include "calib/loop/held_out.h"
+#include "calib/loop/left.h"
 
 namespace toftwin::loop {
 
@@ -17,15 +18,6 @@ struct FittedShape {
   HeldOut held{};
   HeldOut::Gain gain{};  ///< over the model without it
   double worth = 0.0;    ///< the gain less the price of what was looked through
-};
-
-/// Where shapes are fitted: residuals beside a model that is known.
-struct Beside {
-  const Evidence& evidence;
-  const Eigen::VectorXd& y;
-  const Eigen::VectorXd& weight;
-  const Eigen::MatrixXd model;  ///< columns of everything else
-  double scale = 1.0;            ///< deviation of the noise in units of sigma
 };
 
 /// Every family that applies to these covariates, at the inner numbers that leave least; of one covariate sums of some, too.
