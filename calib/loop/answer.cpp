@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "calib/compare/report.h"
+#include "calib/loop/written_model.h"
 #include "protocol/types/counted.h"
 
 namespace toftwin::loop {
@@ -25,11 +26,6 @@ std::string joined(const std::vector<std::string>& parts, const std::string& las
   std::string all;
   for (std::size_t i = 0; i < parts.size(); ++i) all += (i == 0 ? "" : i + 1 == parts.size() ? last : ", ") + parts[i];
   return all;
-}
-
-bool isOfLine(const Effect& effect) { return effect.shape.covariates.front() == kLine; }
-bool isGain(const Discovery& d, const Effect& effect) {
-  return effect.shape.covariates == std::vector<std::string>{std::string{rangeName(d.readings)}} && effect.shape.name() == "straight line";
 }
 
 const Covariate* covariateOf(const Discovery& d, const std::string& name) { return d.open.evidence.find(name); }
@@ -75,11 +71,10 @@ std::size_t columnsOfFamily(const Discovery& d, const Effect& effect, const Fami
 
 std::string partsText(const Discovery& d, const Effect& effect) {
   std::vector<std::string> parts;
-  std::size_t at = 0, column = 0;
-  for (const Family* family : effect.shape.families) {
-    const Inner inner(effect.shape.inner.begin() + static_cast<std::ptrdiff_t>(at), effect.shape.inner.begin() + static_cast<std::ptrdiff_t>(at + family->moves.size()));
-    parts.push_back(partText(d, effect, *family, inner.data(), effect.coefficient.data() + column));
-    at += family->moves.size(), column += columnsOfFamily(d, effect, *family, inner);
+  std::size_t column = 0;
+  for (const Part& part : partsOf(effect.shape)) {
+    parts.push_back(partText(d, effect, *part.family, part.inner.data(), effect.coefficient.data() + column));
+    column += columnsOfFamily(d, effect, *part.family, part.inner);
   }
   return joined(parts);
 }
@@ -146,13 +141,12 @@ std::string headlineOf(const Discovery& d, Answer::Tone tone) {
   if (ladder.has_truth && std::abs(offsetOf(d)) > 0.3 * ladder.last()) rungs.push_back(quantityText(offsetOf(d), unit) + " constant");
   for (const Effect& effect : d.mean.effects)
     if (isGain(d, effect)) rungs.push_back(percent(effect.coefficient[0]) + " gain");
-  const auto count = static_cast<std::size_t>(std::ranges::count_if(d.mean.effects, [&](const Effect& e) { return isOfLine(e); }));
-  if (count > 0 || d.has_group_offsets) rungs.emplace_back(count > 0 ? "series that begin anew in the file" : "offsets of " + (d.readings.capture_name.empty() ? d.readings.session_name : d.readings.capture_name));
+  const auto count = static_cast<std::size_t>(std::ranges::count_if(d.mean.effects, [&](const Effect& e) { return isSeries(e); }));
+  if (count > 0 || d.has_group_offsets) rungs.emplace_back(count > 0 ? "series that begin anew in the file" : "offsets of " + groupColumn(d.readings));
   std::vector<std::string> names;
   for (const Effect& effect : d.mean.effects) {
-    if (isOfLine(effect) || isGain(d, effect)) continue;
-    std::vector<std::string> of;
-    for (const std::string& name : effect.shape.covariates) of.push_back(headerOf(d, name));
+    if (isSeries(effect) || isGain(d, effect)) continue;
+    const auto of = headersOf(d.readings, effect.shape.covariates);
     names.push_back(joined(of, " with "));
   }
   if (!names.empty()) rungs.push_back("what goes with " + joined(names));
@@ -190,7 +184,7 @@ std::vector<std::string> readingsOf(const Discovery& d) {
   if (d.share)
     for (const Effect& effect : d.share->effects) {
       const auto [low, high] = spanOf(columnsOf(d.all.evidence, effect.shape.columns) * effect.coefficient);
-      out.push_back(fmt::format("Their share goes with {}: it changes by {} % (p = {:.4f}).", headerOf(d, effect.shape.covariates.front()), shown(high - low), effect.p));
+      out.push_back(fmt::format("Their share goes with {}: it changes by {} % (p = {:.4f}).", headerOf(d.readings, effect.shape.covariates.front()), shown(high - low), effect.p));
     }
   for (const table::SetAside& aside : d.readings.aside) {
     if (out.size() >= 12) break;
@@ -198,8 +192,7 @@ std::vector<std::string> readingsOf(const Discovery& d) {
   }
   for (const Effect& effect : d.spread.effects) {
     const auto [low, high] = spanOf(columnsOf(d.open.evidence, effect.shape.columns) * effect.coefficient);
-    std::vector<std::string> of;
-    for (const std::string& name : effect.shape.covariates) of.push_back(headerOf(d, name));
+    const auto of = headersOf(d.readings, effect.shape.covariates);
     out.push_back(fmt::format("The noise goes with {}: it grows {}-fold from its least to its largest (p = {:.4f}).", joined(of, " with "), shown(std::exp(high - low)), effect.p));
   }
   return out;
@@ -212,20 +205,17 @@ std::vector<std::string> cautionsOf(const Discovery& d) {
     const Covariate* c = covariateOf(d, effect.shape.covariates.front());
     if (c && c->goes_with_lines && !c->is_order && d.readings.reference_name.empty() == false && c->nature != table::Nature::Time)
       out.push_back(fmt::format("The rows stand in the order of {}: an error that wanders in time would look alike. On blocks of rows that were not used {} become {}. Measure in random order to tell.",
-                                headerOf(d, c->name), quantityText(d.unseen.steps.size() > 1 ? d.unseen.steps[1].rms : d.unseen.first(), d.readings.unit), quantityText(d.unseen.last(), d.readings.unit)));
+                                headerOf(d.readings, c->name), quantityText(d.unseen.steps.size() > 1 ? d.unseen.steps[1].rms : d.unseen.first(), d.readings.unit), quantityText(d.unseen.last(), d.readings.unit)));
     for (const Alternative& other : effect.alternatives) {
-      std::vector<std::string> of, own;
-      for (const std::string& name : other.covariates) of.push_back(headerOf(d, name));
-      for (const std::string& name : effect.shape.covariates) own.push_back(headerOf(d, name));
+      const auto of = headersOf(d.readings, other.covariates), own = headersOf(d.readings, effect.shape.covariates);
       out.push_back(fmt::format("{} would explain it as well as {} (r = {:.2f}): change one while the other stays.", joined(of, " with "), joined(own, " with "), other.correlation));
     }
     if (effect.is_between_groups)
-      out.push_back(fmt::format("{} changes only between {}s: what is said of it rests on {} of them.", headerOf(d, effect.shape.covariates.front()),
-                                d.readings.capture_name.empty() ? d.readings.session_name : d.readings.capture_name, d.open.evidence.groups()));
+      out.push_back(fmt::format("{} changes only between {}s: what is said of it rests on {} of them.", headerOf(d.readings, effect.shape.covariates.front()),
+                                groupColumn(d.readings), d.open.evidence.groups()));
   }
   for (const Score& score : d.mean.unexplained) {
-    std::vector<std::string> of;
-    for (const std::string& name : score.covariates) of.push_back(headerOf(d, name));
+    const auto of = headersOf(d.readings, score.covariates);
     out.push_back(fmt::format("Something goes with {} (it stands out by {} deviations), but none of the shapes tried predicts rows that were not used.", joined(of, " with "), shown(score.deviate)));
   }
   if (!d.is_written) out.emplace_back("The model leaves more on rows that were not used than no model at all: no file is written.");
@@ -238,21 +228,14 @@ std::string quantityText(double value, const std::string& unit) {
   return shown(value) + (unit.empty() ? "" : " " + unit);
 }
 
-std::string headerOf(const Discovery& d, const std::string& covariate) {
-  if (covariate == kLine) return "the line of the file";
-  if (covariate == rangeName(d.readings)) return d.readings.reference_name.empty() ? covariate : d.readings.reference_name;
-  return covariate;
-}
-
 Eigen::VectorXd curveOf(const Evidence& evidence, const Effect& effect) {
   const Eigen::VectorXd curve = columnsOf(evidence, effect.shape.columns) * effect.coefficient;
   return curve.array() - curve.mean();
 }
 
 std::string sentenceOf(const Discovery& d, const Effect& effect) {
-  if (isOfLine(effect)) return seriesText(d, effect);
-  std::vector<std::string> of;
-  for (const std::string& name : effect.shape.covariates) of.push_back(headerOf(d, name));
+  if (isSeries(effect)) return seriesText(d, effect);
+  const auto of = headersOf(d.readings, effect.shape.covariates);
   const auto [low, high] = spanOf(curveOf(d.open.evidence, effect));
   std::string what;
   if (isGain(d, effect)) what = fmt::format("a gain of {}", percent(effect.coefficient[0]));

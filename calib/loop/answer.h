@@ -24,8 +24,6 @@ Answer answerOf(const Discovery& discovery);
 std::string quantityText(double value, const std::string& unit);
 /// One sentence: "speed_m_per_s: a latency of 79 ms (straight line, −78.5 mm per m/s)."
 std::string sentenceOf(const Discovery& discovery, const Effect& effect);
-/// The header behind a name of a term: the reference is called range_mm in terms.
-std::string headerOf(const Discovery& discovery, const std::string& covariate);
 /// An effect above its mean, at each row of this evidence.
 Eigen::VectorXd curveOf(const Evidence& evidence, const Effect& effect);
 

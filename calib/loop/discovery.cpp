@@ -10,6 +10,7 @@
 #include "calib/loop/between_groups.h"
 #include "calib/loop/noise.h"
 #include "calib/loop/projection.h"
+#include "calib/loop/written_model.h"
 
 namespace toftwin::loop {
 namespace {
@@ -81,11 +82,7 @@ void explainMean(Discovery& d, const DiscoverOptions& options) {
   d.mean = explained(e, search);
   d.has_group_offsets = false;
   if (e.groups() < 2) return;
-  const auto left = [&] {
-    Eigen::VectorXd y = e.y;
-    for (const Effect& effect : d.mean.effects) y -= columnsOf(e, effect.shape.columns) * effect.coefficient;
-    return y;
-  };
+  const auto left = [&] { return lessEffects(e, d.mean.effects); };
   while (d.mean.effects.size() < 8) {
     auto more = explainGroups(e, left(), options.alpha);
     if (!more) break;
@@ -128,8 +125,7 @@ Eigen::VectorXd sigmaOf(const Discovery& d, const Evidence& e) {
 Eigen::VectorXd beyondOpen(const Discovery& d, const Evidence& rows) {
   Evidence e = rows;
   if (d.open.evidence.groups() < 2) e = ungrouped(std::move(e));
-  for (const Effect& effect : d.mean.effects) e.y -= columnsOf(e, effect.shape.columns) * effect.coefficient;
-  return robustLeastSquares(e, e.y, Eigen::MatrixXd(e.rows(), 0)).residual;
+  return robustLeastSquares(e, lessEffects(e, d.mean.effects), Eigen::MatrixXd(e.rows(), 0)).residual;
 }
 
 std::optional<Explanation> explainShare(const Discovery& d, const DiscoverOptions& options) {
@@ -143,121 +139,6 @@ std::optional<Explanation> explainShare(const Discovery& d, const DiscoverOption
   if (count < 8.0) return std::nullopt;
   e.sigma.setOnes();
   return explained(e, {.alpha = options.alpha, .draws = options.draws, .seed = options.seed + 2000, .most_effects = 2, .is_robust = false});
-}
-
-// ---- The model -----------------------------------------------------------------------------------------------------
-
-terms::Term constantTerm(double value, terms::Quantity quantity) { return {.quantity = quantity, .coefficient = value}; }
-
-std::string titleOf(const Effect& effect, const Discovery& d) {
-  std::string names;
-  for (const std::string& name : effect.shape.covariates) {
-    const bool is_reference = name == rangeName(d.readings) && !d.readings.reference_name.empty();
-    names += (names.empty() ? "" : " and ") + (is_reference ? d.readings.reference_name : name);
-  }
-  return names + ": " + effect.shape.name();
-}
-
-bool isSeries(const Effect& effect) { return effect.shape.covariates == std::vector<std::string>{std::string{kLine}}; }
-bool isGain(const Effect& effect, const Discovery& d) {
-  return effect.shape.covariates == std::vector<std::string>{std::string{rangeName(d.readings)}} && effect.shape.name() == "straight line";
-}
-
-/// Offsets of groups as levels of the column that names them.
-std::vector<terms::Term> groupTerms(const Discovery& d, const Eigen::VectorXd& offset, terms::Quantity quantity) {
-  const std::string& column = d.readings.capture_name.empty() ? d.readings.session_name : d.readings.capture_name;
-  std::vector<terms::Term> all;
-  for (Eigen::Index g = 0; g < offset.size(); ++g) {
-    terms::Factor level{.basis = terms::Basis::Level, .of = {.parts = {{1.0, column}}}, .level = d.open.evidence.group_names[static_cast<std::size_t>(g)]};
-    if (offset[g] != 0.0) all.push_back({.quantity = quantity, .coefficient = offset[g], .factors = {level}});
-  }
-  return all;
-}
-
-/// Everything at once, on open rows: constant, gain, series, effects.
-Model modelOf(const Discovery& d, const std::vector<Effect>& effects, bool has_offsets) {
-  const Evidence& e = d.open.evidence;
-  const auto quantity = d.readings.unit == "mm" ? terms::Quantity::RangeMm : terms::Quantity::Value;
-  Model model{.data = d.readings.file.filename().string(), .unit = d.readings.unit,
-              .measured = d.readings.measured_name.empty() ? d.readings.error_name : d.readings.measured_name,
-              .reference = d.readings.reference_name};
-  Eigen::VectorXd left = e.y;
-  for (const Effect& effect : effects) left -= columnsOf(e, effect.shape.columns) * effect.coefficient;
-  const Eigen::VectorXd offset = has_offsets ? groupOffsets(e, left) : Eigen::VectorXd();
-  if (has_offsets)
-    for (Eigen::Index i = 0; i < left.size(); ++i) left[i] -= offset[e.group[static_cast<std::size_t>(i)]];
-  const Eigen::VectorXd weight = robustWeights(left.array() - median({left.begin(), left.end()}), e.sigma);
-  // A table without a reference has no constant error: what was measured is what is there.
-  const bool has_truth = e.reference.size() > 0 || d.open.measured.size() == 0;
-  const double constant = has_truth ? left.dot(weight) / weight.sum() : 0.0;
-  if (has_truth || effects.empty()) model.effects.push_back({.title = "constant", .role = "constant", .terms = {constantTerm(constant, quantity)}});
-  const auto add = [&](const Effect& effect, const std::string& role) {
-    model.effects.push_back({.title = role == "effect" ? titleOf(effect, d) : role, .role = role, .terms = termsOf(effect.shape, effect.coefficient, quantity), .p = effect.p});
-  };
-  for (const Effect& effect : effects)
-    if (isGain(effect, d)) add(effect, "gain");
-  for (const Effect& effect : effects)
-    if (isSeries(effect)) add(effect, "series");
-  if (has_offsets) model.effects.push_back({.title = "series", .role = "series", .terms = groupTerms(d, offset, quantity)});
-  for (const Effect& effect : effects)
-    if (!isGain(effect, d) && !isSeries(effect)) add(effect, "effect");
-  return model;
-}
-
-/// Simpler models, each by least squares: what a person would try first.
-std::vector<Rung> rungsOf(const Discovery& d, const std::vector<Effect>& effects, bool has_offsets) {
-  const Evidence e = ungrouped(d.open.evidence);
-  const auto quantity = d.readings.unit == "mm" ? terms::Quantity::RangeMm : terms::Quantity::Value;
-  const bool has_truth = e.reference.size() > 0 || d.open.measured.size() == 0;
-  std::vector<Rung> rungs;
-  if (!has_truth) return rungs;
-  const auto fitted = [&](const std::vector<Product>& products) {
-    const Eigen::MatrixXd x = columnsOf(e, products);
-    const LeastSquares fit = leastSquares(e, e.y, Eigen::VectorXd::Ones(e.rows()), x);
-    std::vector<terms::Term> all{constantTerm((e.y - x * fit.coefficient).mean(), quantity)};
-    for (std::size_t i = 0; i < products.size(); ++i)
-      all.push_back({.quantity = quantity, .coefficient = fit.coefficient[static_cast<Eigen::Index>(i)], .factors = products[i]});
-    return all;
-  };
-  rungs.push_back({"constant", fitted({})});
-  std::vector<Product> products;
-  if (e.reference.size() > 0) {
-    products.push_back({{.basis = terms::Basis::Power, .of = {.parts = {{1.0, std::string{rangeName(d.readings)}}}}, .numbers = {1.0}}});
-    rungs.push_back({"gain", fitted(products)});
-  }
-  for (const Effect& effect : effects) {
-    if (!isSeries(effect)) continue;
-    products.insert(products.end(), effect.shape.columns.begin(), effect.shape.columns.end());
-    if (!rungs.empty() && rungs.back().name == "series") rungs.pop_back();
-    rungs.push_back({"series", fitted(products)});
-  }
-  if (has_offsets) {
-    const auto levels = groupTerms(d, Eigen::VectorXd::Ones(d.open.evidence.groups()), quantity);
-    for (std::size_t i = 1; i < levels.size(); ++i) products.push_back(levels[i].factors);
-    rungs.push_back({"series", fitted(products)});
-  }
-  return rungs;
-}
-
-/// The file as it would be written, read again and applied to rows: what is judged is what a user has.
-Result<> judge(Discovery& d, Model model) {
-  auto read = parseModel(toToml(model), "model.toml");
-  if (!read) return read.error();
-  d.model = *std::move(read);
-  d.seen = ladderOf(d.open, d.model), d.unseen = ladderOf(d.locked, d.model);
-  return {};
-}
-
-Result<> writeModel(Discovery& d) {
-  const auto whole = [&](const std::vector<Effect>& effects, bool has_offsets) {
-    Model model = modelOf(d, effects, has_offsets);
-    model.rungs = rungsOf(d, effects, has_offsets);
-    return judge(d, std::move(model));
-  };
-  if (auto judged = whole(d.mean.effects, d.has_group_offsets); !judged) return judged;
-  if (d.unseen.steps.size() < 2) return {};
-  d.is_written = d.unseen.last() < d.unseen.first();
-  return {};
 }
 
 }  // namespace

@@ -303,6 +303,12 @@ Eigen::MatrixXd columnsOf(const Evidence& evidence, const std::vector<Effect>& e
   return all;
 }
 
+Eigen::VectorXd lessEffects(const Evidence& evidence, const std::vector<Effect>& effects) {
+  Eigen::VectorXd left = evidence.y;
+  for (const Effect& effect : effects) left -= columnsOf(evidence, effect.shape.columns) * effect.coefficient;
+  return left;
+}
+
 void takeNumbers(std::vector<Effect>& effects, const LeastSquares& fit, double variance) {
   Eigen::Index at = 0;
   for (Effect& effect : effects) {

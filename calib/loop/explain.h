@@ -56,6 +56,9 @@ Explanation explain(Evidence& evidence, const ExplainOptions& options);
 /// Coefficients and their covariance, of a fit over all effects' columns. `variance`: of the noise, in units of the fit's weights.
 void takeNumbers(std::vector<Effect>& effects, const LeastSquares& fit, double variance);
 
+/// The response less the effects.
+Eigen::VectorXd lessEffects(const Evidence& evidence, const std::vector<Effect>& effects);
+
 /// All effects' columns, in their order.
 Eigen::MatrixXd columnsOf(const Evidence& evidence, const std::vector<Effect>& effects);
 

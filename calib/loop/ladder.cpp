@@ -28,8 +28,8 @@ Step stepOf(std::string name, const Eigen::VectorXd& left) {
 Ladder ladderOf(const TableEvidence& table, const Model& model) {
   Ladder ladder{.rows = static_cast<std::size_t>(table.evidence.rows())};
   if (ladder.rows == 0) return ladder;
-  // Without a reference nobody knows what is constant: scatter about the mean is all that can be told.
-  ladder.has_truth = table.evidence.reference.size() > 0 || table.measured.size() == 0;
+  // Without a reference scatter about the mean is all that can be told.
+  ladder.has_truth = table.hasTruth();
   const auto left = [&](const std::vector<terms::Term>& terms) {
     Eigen::VectorXd after = table.evidence.y - predicted(table.evidence, terms);
     if (!ladder.has_truth) after.array() -= after.mean();

@@ -84,7 +84,7 @@ Section referenceSection(const Discovery& d) {
   const Covariate* range = e.find(rangeName(d.readings));
   Section section{"error", "Error over the reference", {}, Tone::Neutral, {}};
   const Eigen::VectorXd& x = range ? range->x : e.covariates.front().x;
-  const std::string name = range ? headerOf(d, range->name) : e.covariates.front().name;
+  const std::string name = range ? headerOf(d.readings, range->name) : e.covariates.front().name;
   section.verdict = fmt::format("Measured less reference, {} after nothing and after everything.", counted(e.rows(), "row"));
   const Eigen::VectorXd left = e.y - predicted(e, termsOf(d.model));
   section.blocks.push_back(Figure{"Each dot is the mean of rows that are near each other",
@@ -96,20 +96,20 @@ Section referenceSection(const Discovery& d) {
 Section effectSection(const Discovery& d, const Effect& effect, std::size_t number) {
   const Evidence& e = d.open.evidence;
   const Covariate* c = e.find(effect.shape.covariates.front());
-  Section section{fmt::format("effect-{}", number), fmt::format("Effect {}: {}", number, headerOf(d, effect.shape.covariates.front())), sentenceOf(d, effect), Tone::Neutral, {}};
+  Section section{fmt::format("effect-{}", number), fmt::format("Effect {}: {}", number, headerOf(d.readings, effect.shape.covariates.front())), sentenceOf(d, effect), Tone::Neutral, {}};
   const Eigen::VectorXd curve = curveOf(e, effect);
   const Eigen::VectorXd left = e.y - predicted(e, termsOf(d.model));
   FigureRow row;
   for (const std::string& name : effect.shape.covariates) {
     const Covariate* over = e.find(name);
-    row.figures.push_back({fmt::format("What the other effects leave (dots), and this effect (line), over {}", headerOf(d, name)),
-                           toSvg(Plot{.title = section.title, .x_label = labelled(headerOf(d, name), over->unit), .y_label = labelled("error", d.readings.unit),
+    row.figures.push_back({fmt::format("What the other effects leave (dots), and this effect (line), over {}", headerOf(d.readings, name)),
+                           toSvg(Plot{.title = section.title, .x_label = labelled(headerOf(d.readings, name), over->unit), .y_label = labelled("error", d.readings.unit),
                                       .curves = {dotsOf(over->x, curve + left, "rows", Ink::Measured), lineOf(over->x, curve, "effect")}, .zero_line = true,
                                       .compact = effect.shape.covariates.size() > 1})});
   }
   section.blocks.push_back(std::move(row));
   std::string formula;
-  for (const terms::Term& term : termsOf(effect.shape, effect.coefficient, d.readings.unit == "mm" ? terms::Quantity::RangeMm : terms::Quantity::Value)) formula += terms::toText(term) + "\n";
+  for (const terms::Term& term : termsOf(effect.shape, effect.coefficient, quantityOf(d.readings))) formula += terms::toText(term) + "\n";
   section.blocks.push_back(Details{"Its terms, as model.toml says them", {formula}});
   section.blocks.push_back(Paragraph{fmt::format("On rows that it was not fitted to it gains {} ± {} in the logarithm of the likelihood. Chance of seeing as much without any effect: p {} {:.4f}.{}",
                                                  shown(effect.gain.mean), shown(effect.gain.error), effect.p <= 0.0025 ? "≤" : "=", std::max(effect.p, 0.0001), c && c->nature == table::Nature::Category ? " Names stand in the order that they have in the file." : ""), true, {}, {}});
@@ -133,17 +133,13 @@ Json ladderJson(const Ladder& ladder) {
 }
 
 Json effectJson(const Discovery& d, const Effect& effect) {
-  Json covariates = Json::array(), terms = Json::array(), others = Json::array();
-  for (const std::string& name : effect.shape.covariates) covariates.push(headerOf(d, name));
-  for (const terms::Term& term : termsOf(effect.shape, effect.coefficient, d.readings.unit == "mm" ? terms::Quantity::RangeMm : terms::Quantity::Value)) terms.push(terms::toText(term));
-  for (const Alternative& other : effect.alternatives) {
-    Json names = Json::array();
-    for (const std::string& name : other.covariates) names.push(headerOf(d, name));
-    others.push(Json::object().set("covariates", std::move(names)).set("correlation", other.correlation));
-  }
+  Json terms = Json::array(), others = Json::array();
+  for (const terms::Term& term : termsOf(effect.shape, effect.coefficient, quantityOf(d.readings))) terms.push(terms::toText(term));
+  for (const Alternative& other : effect.alternatives)
+    others.push(Json::object().set("covariates", Json::arrayOf(headersOf(d.readings, other.covariates))).set("correlation", other.correlation));
   const Eigen::VectorXd curve = curveOf(d.open.evidence, effect);
   Json json = Json::object();
-  json.set("covariates", std::move(covariates)).set("shape", effect.shape.name()).set("sentence", sentenceOf(d, effect));
+  json.set("covariates", Json::arrayOf(headersOf(d.readings, effect.shape.covariates))).set("shape", effect.shape.name()).set("sentence", sentenceOf(d, effect));
   json.set("p", effect.p).set("held_out_gain", effect.gain.mean).set("held_out_gain_error", effect.gain.error);
   json.set("least", curve.minCoeff()).set("largest", curve.maxCoeff()).set("rests_on_groups", effect.is_between_groups);
   return json.set("terms", std::move(terms)).set("alternatives", std::move(others));
@@ -198,11 +194,8 @@ Json dataOf(const Discovery& d) {
   json.set("share_without_reading", d.share ? effectsJson(d, d.share->effects) : Json::array());
   json.set("no_readings", noReadingsJson(d));
   Json unexplained = Json::array();
-  for (const Score& score : d.mean.unexplained) {
-    Json names = Json::array();
-    for (const std::string& name : score.covariates) names.push(headerOf(d, name));
-    unexplained.push(Json::object().set("covariates", std::move(names)).set("shape", std::string{score.family->name}).set("deviate", score.deviate));
-  }
+  for (const Score& score : d.mean.unexplained)
+    unexplained.push(Json::object().set("covariates", Json::arrayOf(headersOf(d.readings, score.covariates))).set("shape", score.family->name).set("deviate", score.deviate));
   json.set("unexplained", std::move(unexplained));
   return json.set("sentences", Json::arrayOf(answer.effects)).set("readings", Json::arrayOf(answer.readings)).set("cautions", Json::arrayOf(answer.cautions));
 }

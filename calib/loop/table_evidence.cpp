@@ -29,7 +29,7 @@ Covariate covariateOf(const table::Column& column, const std::vector<std::size_t
 void giveGroups(TableEvidence& out, const table::Readings& readings) {
   Evidence& e = out.evidence;
   e.group.assign(out.row.size(), 0), e.group_names = {""};
-  const std::string& name = readings.capture_name.empty() ? readings.session_name : readings.capture_name;
+  const std::string& name = groupColumn(readings);
   const auto column = std::ranges::find(readings.covariates, name, &table::Column::header);
   if (name.empty() || column == readings.covariates.end()) return;
   std::map<double, int> numbers;
@@ -73,6 +73,26 @@ void markWithinGroups(Evidence& e) {
 }  // namespace
 
 std::string_view rangeName(const table::Readings& readings) { return readings.unit == "mm" ? "range_mm" : "value"; }
+
+terms::Quantity quantityOf(const table::Readings& readings) {
+  return readings.unit == "mm" ? terms::Quantity::RangeMm : terms::Quantity::Value;
+}
+
+const std::string& groupColumn(const table::Readings& readings) {
+  return readings.capture_name.empty() ? readings.session_name : readings.capture_name;
+}
+
+std::string headerOf(const table::Readings& readings, const std::string& covariate) {
+  if (covariate == kLine) return "the line of the file";
+  if (covariate == rangeName(readings)) return readings.reference_name.empty() ? covariate : readings.reference_name;
+  return covariate;
+}
+
+std::vector<std::string> headersOf(const table::Readings& readings, const std::vector<std::string>& covariates) {
+  std::vector<std::string> headers;
+  for (const std::string& covariate : covariates) headers.push_back(headerOf(readings, covariate));
+  return headers;
+}
 
 std::vector<int> seriesOf(std::span<const double> reference) {
   std::vector<int> none(reference.size(), 0);
