@@ -158,19 +158,6 @@ std::string html(const Section& section) {
   return out + "</section>";
 }
 
-Result<> writeFile(const std::filesystem::path& file, const std::string& text) {
-  errno = 0;
-  std::ofstream out{file, std::ios::binary | std::ios::trunc};
-  out << text;
-  out.flush();
-  if (out) return {};
-  const int why = errno;
-  return Error{
-      Error::Code::StorageFull,
-      fmt::format("{}: cannot be written: {}", file.string(),
-                  std::generic_category().message(why))};
-}
-
 std::string withMinus(const std::string& text) { return text.front() == '-' ? "−" + text.substr(1) : text; }
 
 }  // namespace
@@ -244,6 +231,19 @@ std::string toHtml(const Report& report) {
                           [&](const Section& one) { return std::ranges::any_of(one.blocks, isCloud); }))
     out += cloudScript();
   return out + "</body></html>\n";
+}
+
+Result<> writeFile(const std::filesystem::path& file, const std::string& text) {
+  errno = 0;
+  std::ofstream out{file, std::ios::binary | std::ios::trunc};
+  out << text;
+  out.flush();
+  if (out) return {};
+  const int why = errno;
+  return Error{
+      Error::Code::StorageFull,
+      fmt::format("{}: cannot be written: {}", file.string(),
+                  std::generic_category().message(why))};
 }
 
 Result<std::filesystem::path> write(const Report& report, const std::filesystem::path& folder) {

@@ -93,6 +93,9 @@ struct WrittenReport {
 /// page's path.
 Result<std::filesystem::path> write(const Report& report, const std::filesystem::path& folder);
 
+/// One text into a file beside a report; errors (StorageFull) say which file and why.
+Result<> writeFile(const std::filesystem::path& file, const std::string& text);
+
 /// A number for people: fixed decimals, real minus sign; "–" if it is not finite.
 std::string shown(double value, int decimals = 1);
 /// So many digits that say something: "1.23", "−3.97·10⁻⁶".

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <numeric>
 #include <system_error>
 
@@ -172,13 +171,6 @@ Json noReadingsJson(const Discovery& d) {
   return all;
 }
 
-Result<> writeText(const std::filesystem::path& file, const std::string& text) {
-  std::ofstream out{file, std::ios::binary | std::ios::trunc};
-  out << text;
-  if (out.flush()) return {};
-  return Error{Error::Code::Internal, fmt::format("{} cannot be written", file.string())};
-}
-
 }  // namespace
 
 Json dataOf(const Discovery& d) {
@@ -231,7 +223,7 @@ Result<std::filesystem::path> write(const Discovery& d, const std::filesystem::p
   if (!page) return page;
   const auto model = folder / "model.toml";
   if (d.is_written) {
-    if (auto written = writeText(model, toToml(d.model)); !written) return written.error();
+    if (auto written = writeFile(model, toToml(d.model)); !written) return written.error();
   } else {
     // A model of an earlier run would be taken for this one's.
     std::error_code ignored;

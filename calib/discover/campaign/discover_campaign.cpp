@@ -4,11 +4,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <fstream>
 
 #include <fmt/format.h>
 
-#include "calib/loop/camera_text.h"
 #include "calib/discover/campaign/before_search.h"
 #include "calib/discover/campaign/carriers.h"
 #include "calib/discover/campaign/found_model.h"
@@ -25,6 +23,7 @@
 #include "calib/discover/campaign/step_effect.h"
 #include "calib/discover/campaign/stood_off.h"
 #include "calib/discover/marginal.h"
+#include "calib/loop/camera_text.h"
 
 namespace toftwin::discover {
 namespace {
@@ -369,12 +368,7 @@ Result<CampaignAnswer> discoverCampaign(const CampaignJob& job, compare::Progres
   if (!finding) return finding.error();
   auto page = writeReport(job, *finding);
   if (!page) return page.error();
-  std::ofstream out{job.output / "model.toml"};
-  out << finding->model_toml;
-  out.flush();
-  if (!out)
-    return Error{Error::Code::StorageFull,
-                 fmt::format("{}: cannot be written", (job.output / "model.toml").string())};
+  if (auto written = compare::writeFile(job.output / "model.toml", finding->model_toml); !written) return written.error();
   progress.end();
   return CampaignAnswer{*std::move(page), verdictOf(*finding), std::move(finding->notes)};
 }
