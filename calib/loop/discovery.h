@@ -11,13 +11,6 @@
 
 namespace toftwin::loop {
 
-struct DiscoverOptions {
-  double alpha = 0.01;         ///< chance that something is found where there is nothing
-  double locked_share = 0.2;   ///< of the rows, only for judging
-  int draws = 400;
-  std::uint64_t seed = 1;
-};
-
 /// All that was found out about a table.
 struct Discovery {
   table::Readings readings{};
@@ -34,7 +27,5 @@ struct Discovery {
   bool is_written = true;        ///< false: the model is no better than none on locked rows
   Ladder seen{}, unseen{};       ///< of open rows, of locked rows: the written model's
 };
-
-Result<Discovery> discover(table::Readings readings, const DiscoverOptions& options);
 
 }  // namespace toftwin::loop

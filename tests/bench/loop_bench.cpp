@@ -22,7 +22,7 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
-#include "calib/loop/discovery.h"
+#include "calib/loop/discover.h"
 
 namespace {
 

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "calib/loop/answer.h"
-#include "calib/loop/discovery.h"
+#include "calib/loop/discover.h"
 #include "calib/table/readings.h"
 
 namespace toftwin::testing {

@@ -6,7 +6,7 @@
 #include <numbers>
 
 #include "calib/loop/answer.h"
-#include "calib/loop/discovery.h"
+#include "calib/loop/discover.h"
 #include "tests/loop/made_table.h"
 
 namespace toftwin::loop {

@@ -10,6 +10,7 @@
 #include "calib/discover/campaign/before_search.h"
 #include "calib/loop/answer.h"
 #include "calib/loop/camera.h"
+#include "calib/loop/discover.h"
 #include "calib/loop/page.h"
 #include "calib/table/readings.h"
 #include "tools/cli/arguments.h"

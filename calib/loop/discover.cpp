@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calib/loop/discovery.h"
+#include "calib/loop/discover.h"
 
 #include <algorithm>
 #include <cmath>
