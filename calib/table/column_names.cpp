@@ -22,14 +22,9 @@ std::vector<std::string> namesInComment(std::string_view comment, std::size_t wi
   return {};
 }
 
-std::vector<std::string> namesAtWideGaps(std::span<const std::string_view> fields, std::size_t width) {
-  if (fields.size() <= width || width == 0) return {};
-  const char* begin = fields.front().data();
-  const char* end = fields.back().data() + fields.back().size();
-  if (end < begin) return {};
-  std::string_view line{begin, static_cast<std::size_t>(end - begin)};
+std::vector<std::string> namesAtWideGaps(std::string_view line, std::size_t width) {
   std::vector<std::string> names;
-  while (!line.empty()) {
+  for (line = trimmed(line); !line.empty() && names.size() <= width;) {
     const std::size_t gap = std::min(line.find("  "), line.size());
     names.emplace_back(trimmed(line.substr(0, gap)));
     line = trimmed(line.substr(gap));

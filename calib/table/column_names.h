@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,7 +12,7 @@ namespace toftwin::table {
 /// Fields of a comment as names of so many columns, at whichever delimiter parts it so; empty: it names none.
 std::vector<std::string> namesInComment(std::string_view comment, std::size_t width, char delimiter);
 
-/// Words parted by two blanks or more, as a line of names over columns of a fixed width; empty: they are not so many.
-std::vector<std::string> namesAtWideGaps(std::span<const std::string_view> fields, std::size_t width);
+/// Words of a line parted by two blanks or more, as names over columns of a fixed width; empty: they are not so many.
+std::vector<std::string> namesAtWideGaps(std::string_view line, std::size_t width);
 
 }  // namespace toftwin::table

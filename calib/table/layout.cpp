@@ -182,7 +182,7 @@ class Finder {
     } else if (fields.size() == width_ + 1 && fields.back().empty()) {
       layout_.header.pop_back();
     } else if (delimiter_ == kBlanks) {
-      if (auto names = namesAtWideGaps(fields, width_); !names.empty()) layout_.header = std::move(names);
+      if (auto names = namesAtWideGaps(records_.text[*names_], width_); !names.empty()) layout_.header = std::move(names);
     }
   }
   template <class Predicate>

@@ -73,7 +73,7 @@ class Splitter {
     return end == std::string_view::npos ? text_.size() : end;
   }
   void takeRecord() {
-    const std::size_t before = records_.fields.size();
+    const std::size_t before = records_.fields.size(), begin = at_;
     records_.line.push_back(line_);
     while (takeField()) {
     }
@@ -85,6 +85,7 @@ class Splitter {
     if (is_empty && !records_.open_quote) {  // as spreadsheets write empty rows
       records_.fields.resize(before), records_.line.pop_back();
     } else {
+      records_.text.push_back(text_.substr(begin, at_ - begin));
       records_.begin.push_back(records_.fields.size());
     }
     if (at_ < text_.size() && isLineEnd(text_[at_])) endLine();

@@ -23,6 +23,7 @@ struct Records {
   std::vector<std::string_view> fields{};  ///< of all records, without blanks around them
   std::vector<std::size_t> begin{0};       ///< of record i: the fields from begin[i] to before begin[i + 1]
   std::vector<std::size_t> line{};         ///< on which a record begins, from 1
+  std::vector<std::string_view> text{};    ///< of a record as it was written, its quotes and all
   std::vector<Comment> comments{};
   std::deque<std::string> unquoted{};      ///< fields that held doubled quotes
   std::optional<std::size_t> open_quote{}; ///< the line of a quote that is never closed; splitting ends there

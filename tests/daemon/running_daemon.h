@@ -21,6 +21,7 @@
 #include <toftwin/client.h>
 
 #include "../kept_log.h"
+#include "../open_folder.h"
 #include "daemon/daemon.h"
 #include "fakes.h"
 #include "protocol/transport/memfd.h"
@@ -35,9 +36,8 @@ inline constexpr std::chrono::seconds kSoon{30};  // only a broken daemon needs 
 class RunningDaemon : public testing::Test {
  protected:
   void SetUp() override {
-    std::string pattern = testing::TempDir() + "toftwindXXXXXX";
-    ASSERT_NE(::mkdtemp(pattern.data()), nullptr);
-    folder_ = pattern;
+    folder_ = toftwin::test::makeOpenFolder("toftwind");
+    ASSERT_FALSE(folder_.empty());
   }
   void TearDown() override {
     stop();

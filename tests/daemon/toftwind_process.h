@@ -19,6 +19,8 @@
 
 #include <toftwin/client.h>
 
+#include "../open_folder.h"
+
 /// toftwind as a process, in a folder of the test's own.
 namespace toftwin::test {
 
@@ -85,9 +87,8 @@ class Process {
 class Toftwind : public testing::Test {
  protected:
   void SetUp() override {
-    std::string name = testing::TempDir() + "toftwindXXXXXX";
-    ASSERT_NE(::mkdtemp(name.data()), nullptr);
-    folder_ = name;
+    folder_ = makeOpenFolder("toftwind");
+    ASSERT_FALSE(folder_.empty());
   }
   void TearDown() override { std::filesystem::remove_all(folder_); }
 

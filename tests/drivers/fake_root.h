@@ -1,22 +1,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <unistd.h>
-
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <string>
+
+#include "../open_folder.h"
 
 namespace toftwin::test {
 
 /// A folder that stands for "/" and is gone afterwards.
 class FakeRoot {
  public:
-  FakeRoot() {
-    std::string name = (std::filesystem::temp_directory_path() / "rootXXXXXX").string();
-    path_ = ::mkdtemp(name.data());
-  }
+  FakeRoot() : path_(makeOpenFolder("root")) {}
   ~FakeRoot() { std::filesystem::remove_all(path_); }
   FakeRoot(const FakeRoot&) = delete;
   FakeRoot& operator=(const FakeRoot&) = delete;
