@@ -38,12 +38,20 @@ class Accepting {
   Accepting(const Accepting&) = delete;
   Accepting& operator=(const Accepting&) = delete;
   [[nodiscard]] std::uint16_t port() const { return port_; }
+  /// While it is not open, the kernel keeps those that come, up to its own bound: they are taken afterwards.
+  void setOpen(bool is_open) {
+    if (std::exchange(is_open_, is_open) == is_open) return;
+    boost::system::error_code ignored;
+    is_open ? next() : static_cast<void>(acceptor_.cancel(ignored));
+  }
 
  private:
   void next() {
+    if (!is_open_) return;
     acceptor_.async_accept(
         [this, alive = is_alive_](boost::system::error_code error, boost::asio::ip::tcp::socket socket) {
           if (!*alive || error == boost::asio::error::operation_aborted) return;
+          if (!is_open_) return;  // it came just before
           struct GoOn {  // also where taking it throws
             Accepting& accepting;
             bool has_failed;
@@ -64,6 +72,7 @@ class Accepting {
   const Networks allowed_;
   boost::asio::steady_timer pause_;
   const std::uint16_t port_;
+  bool is_open_ = true;
   const std::function<void(boost::asio::ip::tcp::socket)> take_;
   const std::shared_ptr<bool> is_alive_ =
       std::make_shared<bool>(true);  // shared with handlers that come later

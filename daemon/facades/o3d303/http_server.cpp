@@ -115,14 +115,14 @@ HttpServer::~HttpServer() {
 }
 
 void HttpServer::setOpen(bool is_open) {
-  is_open_ = is_open;
+  accepting_.setOpen(is_open);
   if (is_open) return;
   const auto all = std::exchange(connections_, {});
   for (const auto& connection : all) connection->close();
 }
 
 void HttpServer::take(tcp::socket socket) {
-  if (!is_open_ || connections_.size() >= kMostHttpConnections) return;
+  if (connections_.size() >= kMostHttpConnections) return;
   auto connection = std::make_shared<Connection>(*this, std::move(socket));
   connections_.insert(connection);
   connection->read();

@@ -30,7 +30,7 @@ class HttpServer {
   HttpServer& operator=(const HttpServer&) = delete;
 
   [[nodiscard]] std::uint16_t port() const { return accepting_.port(); }
-  /// Closes all connections and takes no more, or takes them again.
+  /// Closes all connections and takes no more until it is open again: those that come wait for that.
   void setOpen(bool is_open);
 
  private:
@@ -39,7 +39,6 @@ class HttpServer {
 
   const std::vector<std::string> own_names_;
   const Ask ask_;
-  bool is_open_ = true;
   std::set<std::shared_ptr<Connection>> connections_;  // shared with their handlers
   const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
   Accepting accepting_;

@@ -32,14 +32,13 @@ PcicServer::~PcicServer() {
 }
 
 void PcicServer::setOpen(bool is_open) {
-  is_open_ = is_open;
+  accepting_.setOpen(is_open);
   if (is_open) return;
   const auto all = connections_;
   for (const auto& connection : all) connection->close();
 }
 
 void PcicServer::take(tcp::socket socket) {
-  if (!is_open_) return;
   if (connections_.size() >= kMostPcicConnections) return tellError(PcicError::kTooManyConnections);
   auto connection = std::make_shared<Connection>(*this, std::move(socket), freeNumber());
   connections_.push_back(connection);

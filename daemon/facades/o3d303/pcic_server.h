@@ -55,6 +55,7 @@ class PcicServer {
   PcicServer& operator=(const PcicServer&) = delete;
 
   [[nodiscard]] std::uint16_t port() const { return accepting_.port(); }
+  /// Closes all connections and takes no more until it is open again: those that come wait for that.
   void setOpen(bool is_open);
   /// To every connection that wants frames, in its own schema; those with equal schemas share the bytes.
   /// Where the line is cut, half of the message leaves, and the connection ends with it. Whether it went to
@@ -73,7 +74,6 @@ class PcicServer {
   [[nodiscard]] int freeNumber() const;
 
   const Hooks hooks_;
-  bool is_open_ = true;
   int last_error_ = 0;
   static constexpr int kWires = 2;
   std::array<bool, kWires> wires_{};  ///< states of the camera's outputs, which nothing is tied to

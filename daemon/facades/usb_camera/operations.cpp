@@ -25,6 +25,7 @@ void appendText(Bytes& to, std::string_view text, std::size_t size) {
 
 Bytes headOf(std::uint32_t code, std::uint32_t status) {
   Bytes bytes;
+  bytes.reserve(kOperationBytes);
   appendBig16(bytes, kUsbipVersion);
   appendBig16(bytes, code);
   appendBig32(bytes, status);

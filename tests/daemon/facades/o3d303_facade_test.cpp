@@ -325,6 +325,17 @@ TEST_F(O3d303Facade, ARebootDropsEveryoneAndComesBack) {
   EXPECT_EQ(rpc.fault(rpc.session(""), "heartbeat", {5}), 100'000) << "the session is gone";
 }
 
+TEST_F(O3d303Facade, WhoConnectsWhileItBootsIsAnsweredAfterwards) {
+  startO3d303(kPattern, "boot_time_s = 1");
+  ASSERT_TRUE(eventually([&] { return answers(); }));
+  auto rpc = camera();
+  PcicClient connected{rpc.pcicPort()};
+  rpc.call("", "reboot", {0});
+  EXPECT_TRUE(connected.isClosedByPeer()) << "now it boots";
+  EXPECT_EQ(rpc.call("", "getParameter", {"DeviceType"}).text(), "1:2");
+  PcicClient{rpc.pcicPort()}.frame();
+}
+
 TEST_F(O3d303Facade, HealthSaysWhereItIsAndHowManyClientsItHas) {
   startO3d303(kPattern);
   auto native = client();
