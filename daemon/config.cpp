@@ -11,7 +11,7 @@
 #include <set>
 #include <utility>
 
-#include "daemon/correction.h"
+#include "daemon/corrected_source.h"
 #include "daemon/networks.h"
 #include "daemon/thrown.h"
 #include "protocol/settings/describe.h"
@@ -113,20 +113,20 @@ std::optional<RecordPlan> readRecord(settings::Table& table, const RecordKeys& k
   return std::nullopt;
 }
 
-std::shared_ptr<const LearnedCorrection> correctionOf(const SourceKeys& keys, settings::Table& table) {
+std::shared_ptr<const sim::LearnedCorrection> correctionOf(const SourceKeys& keys, settings::Table& table) {
   if (keys.correction.empty()) return nullptr;
-  auto read = readCorrection(table.resolve(keys.correction));
+  auto read = sim::readCorrection(table.resolve(keys.correction));
   if (read) return *std::move(read);
   table.complain("correction", fmt::format("= \"{}\": {}", keys.correction, read.error().message));
   return nullptr;
 }
 
 /// The opened source corrected. That it has no range is a mistake of the configuration.
-Result<std::unique_ptr<drivers::Source>> openedCorrected(std::shared_ptr<const LearnedCorrection> correction,
+Result<std::unique_ptr<drivers::Source>> openedCorrected(std::shared_ptr<const sim::LearnedCorrection> correction,
                                                          Result<std::unique_ptr<drivers::Source>> opened,
                                                          settings::Table& table) {
   if (!correction || !opened || *opened == nullptr) return opened;
-  if (const std::string problem = problemWith(*correction, (*opened)->info().planes); !problem.empty())
+  if (const std::string problem = sim::problemWith(*correction, (*opened)->info().planes, (*opened)->info().camera); !problem.empty())
     table.complain("correction", "cannot be had: " + problem);
   return corrected(std::move(correction), std::move(opened));
 }

@@ -20,9 +20,11 @@
 #include "drivers/source.h"
 #include "protocol/settings/settings.h"
 
-namespace toftwin::daemon {
+namespace toftwin::sim {
+struct LearnedCorrection;  // sim/correction/learned_correction.h
+}
 
-struct LearnedCorrection;  // correction.h
+namespace toftwin::daemon {
 
 /// [listen]
 struct ListenKeys {
@@ -198,7 +200,7 @@ struct ConfiguredSource {
   SourceKeys keys;
   const drivers::Driver* driver = nullptr;
   settings::Table table;
-  std::shared_ptr<const LearnedCorrection> correction;  ///< null: none, or as before
+  std::shared_ptr<const sim::LearnedCorrection> correction;  ///< null: none, or as before
   std::shared_ptr<FaultPlan> faults;  ///< shared by all openings of the source; null: as before
   std::string fingerprint;  ///< equal for sources that need not be opened anew on a reload
   bool is_as_before = false;

@@ -14,7 +14,7 @@
 
 #include <toftwin/client.h>
 
-#include "daemon/correction.h"
+#include "daemon/corrected_source.h"
 #include "daemon/notify.h"
 #include "daemon/start_signals.h"
 #include "daemon/thrown.h"

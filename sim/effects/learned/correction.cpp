@@ -27,6 +27,8 @@ std::string whyNot(const terms::Term& term) {
     case Quantity::RangeMm:
     case Quantity::AmplitudePercent:
       break;
+    case Quantity::Value:
+      return "it is of a table's values, which are no ranges";
     case Quantity::NoiseMm:
       return "noise cannot be taken off";
     case Quantity::InvalidPercent:
