@@ -3,7 +3,7 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
+#include <limits>
 
 #include <fmt/format.h>
 
@@ -13,18 +13,17 @@ namespace {
 constexpr std::size_t kStraightColumns = 7;  ///< a number in each of four states
 
 bool isOneOfFew(const CovariateInfo& covariate) {
-  return covariate.nature == Nature::Category ||
-         (!covariate.levels.empty() && covariate.levels.size() <= kSurfaceKnots);
+  return !covariate.levels.empty() && covariate.levels.size() <= kSurfaceKnots;
 }
 
-Term one(const CovariateInfo& covariate, Shape shape, std::vector<double> numbers) {
-  return {{{covariate.name, shape, std::move(numbers)}}, covariate.stage};
+Term one(const CovariateInfo& covariate, Basis basis, std::vector<double> numbers) {
+  return {{factorOf(covariate.name, basis, std::move(numbers))}, covariate.stage};
 }
 
 /// Places of knots: each level, or quantiles, each once.
 std::vector<double> knotsOf(const CovariateInfo& covariate, std::size_t count) {
   std::vector<double> knots;
-  if (!covariate.levels.empty() && covariate.levels.size() <= count) return covariate.levels;
+  if (isOneOfFew(covariate) || (!covariate.levels.empty() && covariate.levels.size() <= count)) return covariate.levels;
   const auto& q = covariate.quantiles;
   if (q.empty()) return knots;
   for (std::size_t i = 0; i < count; ++i) {
@@ -38,18 +37,13 @@ std::vector<double> knotsOf(const CovariateInfo& covariate, std::size_t count) {
   return knots;
 }
 
-/// All hats, or all values.
+/// Hats that add up to 1.
 std::vector<Term> completeBasis(const CovariateInfo& covariate, std::size_t count) {
+  constexpr double kFar = std::numeric_limits<double>::infinity();
   std::vector<Term> terms;
-  if (isOneOfFew(covariate)) {
-    for (const double level : covariate.levels) terms.push_back(one(covariate, Shape::Equal, {level}));
-    return terms;
-  }
   const auto knots = knotsOf(covariate, count);
-  for (std::size_t i = 0; i < knots.size(); ++i) {
-    terms.push_back(one(covariate, Shape::Hat,
-                        {knots[i == 0 ? 0 : i - 1], knots[i], knots[i + 1 < knots.size() ? i + 1 : i]}));
-  }
+  for (std::size_t i = 0; i < knots.size(); ++i)
+    terms.push_back(one(covariate, Basis::Hat, {i == 0 ? -kFar : knots[i - 1], knots[i], i + 1 < knots.size() ? knots[i + 1] : kFar}));
   return terms;
 }
 
@@ -57,8 +51,8 @@ TermGroup waves(const CovariateInfo& covariate, int least, int most) {
   TermGroup group{fmt::format("{} to {} waves over {}", least, most, covariate.name), Kind::Generic, {}, 0};
   const double span = covariate.quantiles.back() - covariate.quantiles.front();
   for (int k = least; k <= most; ++k) {
-    group.terms.push_back(one(covariate, Shape::Sine, {span / k}));
-    group.terms.push_back(one(covariate, Shape::Cosine, {span / k}));
+    group.terms.push_back(one(covariate, Basis::Sine, {span / k}));
+    group.terms.push_back(one(covariate, Basis::Cosine, {span / k}));
   }
   return group;
 }
@@ -67,8 +61,8 @@ TermGroup waves(const CovariateInfo& covariate, int least, int most) {
 TermGroup harmonicsTimes(const CovariateInfo& distance, const CovariateInfo& other) {
   std::vector<Term> harmonics;
   for (const int k : {1, 2, 4, 8}) {
-    for (const Shape shape : {Shape::Sine, Shape::Cosine})
-      harmonics.push_back(one(distance, shape, {distance.period / k}));
+    for (const Basis basis : {Basis::Sine, Basis::Cosine})
+      harmonics.push_back(one(distance, basis, {distance.period / k}));
   }
   return {fmt::format("harmonics over {} that change with {}", distance.name, other.name), Kind::Generic,
           products(harmonics, completeBasis(other, 2)), 0};
@@ -78,14 +72,12 @@ TermGroup parity(const CovariateInfo& covariate, int modulus) {
   TermGroup group{fmt::format("{} modulo {}", covariate.name, modulus), Kind::Generic, {}, 0};
   for (int r = 1; r < modulus; ++r)
     group.terms.push_back(
-        one(covariate, Shape::Modulo, {static_cast<double>(modulus), static_cast<double>(r)}));
+        one(covariate, Basis::Class, {static_cast<double>(modulus), static_cast<double>(r)}));
   return group;
 }
 
 bool varies(const CovariateInfo& covariate) {
-  return covariate.nature == Nature::Category
-             ? covariate.levels.size() > 1
-             : !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
+  return !covariate.quantiles.empty() && covariate.quantiles.back() > covariate.quantiles.front();
 }
 
 /// A place of the image with what a pixel sees there: what a lens or the camera's sides change.
@@ -160,7 +152,7 @@ std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariat
     if (covariate.nature == Nature::Index) {
       for (const int modulus : {2, 3, 4}) groups.push_back(parity(covariate, modulus));
     }
-    const bool is_continuous = covariate.nature != Nature::Category && covariate.levels.empty();
+    const bool is_continuous = covariate.levels.empty();
     if (!is_continuous || isByItself(covariate)) continue;
     if (options.captures >= 20) groups.push_back(waves(covariate, 1, 4));
     if (options.captures >= 40) groups.push_back(waves(covariate, 5, 10));

@@ -23,12 +23,12 @@ struct CandidateOptions {
 bool isByItself(const CovariateInfo& covariate);
 
 /// For each covariate: a smooth function of it; waves of 1 to 20 periods over its spread; for a count of
-/// frames, even and odd; for names, each its own value. For each pair: a smooth surface.
+/// frames, even and odd. For each pair: a smooth surface.
 std::vector<TermGroup> genericCandidates(std::span<const CovariateInfo> covariates,
                                          const CandidateOptions& options);
 
 /// A smooth function: hats between `knots` quantiles, without the first, whose place an offset takes. Levels:
-/// one hat for each; names: one value for each; rates: straight, whatever the knots.
+/// one hat for each; rates: straight, whatever the knots.
 TermGroup smoothIn(const CovariateInfo& covariate, std::size_t knots);
 /// A surface over two covariates.
 TermGroup smoothIn(const CovariateInfo& a, const CovariateInfo& b, std::size_t knots);

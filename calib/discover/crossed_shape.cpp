@@ -29,7 +29,7 @@ bool canBeCrossed(const Context& context, const Explanation& one) {
 
 bool isStrengthOf(const CovariateInfo& covariate) {
   const auto& spread = covariate.quantiles;
-  return covariate.nature != Nature::Category && !isByItself(covariate) && !spread.empty() &&
+  return !isByItself(covariate) && !spread.empty() &&
          spread.back() > spread.front();
 }
 

@@ -197,16 +197,16 @@ bool isTime(const FittedForm& part, const std::string& name) {
 
 std::string nameOfInner(const FittedForm& part, std::size_t which) {
   const auto& x = part.form.covariates.front();
-  switch (part.group.terms.front().factors.front().shape) {
-    case Shape::Decay:
+  switch (part.group.terms.front().factors.front().basis) {
+    case Basis::Decay:
       return fmt::format("{}{} in {}", isTime(part, x) ? "time constant" : "decay length",
                          part.inner.size() == 2 ? fmt::format(" {}", which + 1) : "", x);
-    case Shape::Sine:
-    case Shape::Cosine:
+    case Basis::Sine:
+    case Basis::Cosine:
       return fmt::format("waves per unit of {}", x);
-    case Shape::Sigmoid:
+    case Basis::Sigmoid:
       return fmt::format("{} of {}", which == 0 ? "centre" : "width", x);
-    case Shape::Hinge:
+    case Basis::Hinge:
       return fmt::format("corner in {}", x);
     default:
       return fmt::format("place in {}", x);

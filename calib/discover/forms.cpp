@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <fmt/format.h>
@@ -12,6 +13,7 @@ namespace toftwin::discover {
 namespace {
 
 constexpr std::array kPowers{1.0, 2.0, 3.0, 0.5, -0.5, -1.0, -2.0};
+constexpr double kFar = std::numeric_limits<double>::infinity();
 constexpr std::size_t kMostSwitched = 4;  ///< names that may each have an exponential of their own
 
 double least(const CovariateInfo& x) { return x.quantiles.front(); }
@@ -34,12 +36,16 @@ TermGroup group(const Form& form, std::vector<Term> terms) {
   return {form.name, Kind::Generic, std::move(terms), static_cast<int>(form.inner.size())};
 }
 
-Term term(const CovariateInfo& x, Shape shape, std::vector<double> numbers) {
-  return {{{x.name, shape, std::move(numbers)}}, x.stage};
+Term term(const CovariateInfo& x, Basis basis, std::vector<double> numbers) {
+  return {{factorOf(x.name, basis, std::move(numbers))}, x.stage};
+}
+/// 1 at that level, falling to 0 at its neighbours.
+Term atLevel(const CovariateInfo& x, std::size_t i) {
+  return term(x, Basis::Hat, {i > 0 ? x.levels[i - 1] : -kFar, x.levels[i], i + 1 < x.levels.size() ? x.levels[i + 1] : kFar});
 }
 
 Term powerOrLog(const CovariateInfo& x, double power) {
-  return power == 0.0 ? term(x, Shape::Log, {}) : term(x, Shape::Power, {power});
+  return power == 0.0 ? term(x, Basis::Log, {}) : term(x, Basis::Power, {power});
 }
 
 std::string powerInWords(const CovariateInfo& x, double power) { return inWords(powerOrLog(x, power)); }
@@ -60,21 +66,20 @@ TermGroup powers(const Form& f, std::span<const double>) {
 }
 
 TermGroup decay(const Form& f, std::span<const double> inner) {
-  return group(f, {term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]})});
+  return group(f, {term(f.of[0], Basis::Decay, {inner[0]})});
 }
 
 /// A short and a long one.
 TermGroup decays(const Form& f, std::span<const double> inner) {
-  return group(f, {term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]}),
-                   term(f.of[0], Shape::Decay, {inner[1], f.fixed[0]})});
+  return group(f, {term(f.of[0], Basis::Decay, {inner[0]}), term(f.of[0], Basis::Decay, {inner[1]})});
 }
 
 /// Of one searched frequency, or of fixed lengths.
 TermGroup wave(const Form& f, std::span<const double> inner) {
   std::vector<Term> terms;
   for (const double length : f.fixed.empty() ? std::vector<double>{1.0 / inner[0]} : f.fixed) {
-    terms.push_back(term(f.of[0], Shape::Sine, {length}));
-    terms.push_back(term(f.of[0], Shape::Cosine, {length}));
+    terms.push_back(term(f.of[0], Basis::Sine, {length}));
+    terms.push_back(term(f.of[0], Basis::Cosine, {length}));
   }
   return group(f, std::move(terms));
 }
@@ -83,8 +88,8 @@ TermGroup wave(const Form& f, std::span<const double> inner) {
 TermGroup wavesTimes(const Form& f, std::span<const double>) {
   std::vector<Term> terms;
   for (std::size_t i = 1; i < f.fixed.size(); ++i) {
-    for (const Shape shape : {Shape::Sine, Shape::Cosine}) {
-      terms.push_back(term(f.of[0], shape, {f.fixed[i]}));
+    for (const Basis basis : {Basis::Sine, Basis::Cosine}) {
+      terms.push_back(term(f.of[0], basis, {f.fixed[i]}));
       Term both = terms.back();
       both.factors.push_back(powerOrLog(f.of[1], f.fixed[0]).factors[0]);
       terms.push_back(std::move(both));
@@ -95,35 +100,38 @@ TermGroup wavesTimes(const Form& f, std::span<const double>) {
 
 /// x beyond a place, on the side that fixed[0] says.
 TermGroup hinge(const Form& f, std::span<const double> inner) {
-  return group(f, {term(f.of[0], Shape::Hinge, {inner[0], f.fixed[0]})});
+  Term rise = term(f.of[0], Basis::Hinge, {f.fixed[0] * inner[0]});
+  rise.factors[0].of.parts[0].weight = f.fixed[0];
+  return group(f, {std::move(rise)});
 }
 
-/// fixed: radians in the angle's unit.
-TermGroup tanSquared(const Form& f, std::span<const double>) {
-  return group(f, {term(f.of[0], Shape::TanSquared, f.fixed)});
+/// fixed: degrees in the angle's unit.
+TermGroup angular(const Form& f, Basis basis) {
+  Term one = term(f.of[0], basis, {});
+  one.factors[0].of.parts[0].weight = f.fixed[0];
+  return group(f, {std::move(one)});
 }
-TermGroup secant(const Form& f, std::span<const double>) {
-  return group(f, {term(f.of[0], Shape::Secant, f.fixed)});
-}
+TermGroup tanSquared(const Form& f, std::span<const double>) { return angular(f, Basis::Tangent2); }
+TermGroup secant(const Form& f, std::span<const double>) { return angular(f, Basis::Secant); }
 
 TermGroup step(const Form& f, std::span<const double> inner) {
-  return group(f, {term(f.of[0], Shape::Step, {inner[0]})});
+  return group(f, {term(f.of[0], Basis::Step, {inner[0]})});
 }
 
 TermGroup sigmoid(const Form& f, std::span<const double> inner) {
-  return group(f, {term(f.of[0], Shape::Sigmoid, {inner[0], inner[1]})});
+  return group(f, {term(f.of[0], Basis::Sigmoid, {inner[0], inner[1]})});
 }
 
 TermGroup modulo(const Form& f, std::span<const double>) {
   std::vector<Term> terms;
-  for (double r = 1.0; r < f.fixed[0]; ++r) terms.push_back(term(f.of[0], Shape::Modulo, {f.fixed[0], r}));
+  for (double r = 1.0; r < f.fixed[0]; ++r) terms.push_back(term(f.of[0], Basis::Class, {f.fixed[0], r}));
   return group(f, std::move(terms));
 }
 
 TermGroup levels(const Form& f, std::span<const double>) {
   std::vector<Term> terms;
   for (std::size_t i = 1; i < f.of[0].levels.size(); ++i)
-    terms.push_back(term(f.of[0], Shape::Equal, {f.of[0].levels[i]}));
+    terms.push_back(atLevel(f.of[0], i));
   return group(f, std::move(terms));
 }
 
@@ -141,7 +149,7 @@ TermGroup product(const Form& f, std::span<const double>) {
 TermGroup switched(const Form& f, std::span<const double>) {
   std::vector<Term> terms;
   for (std::size_t i = 1; i < f.of[0].levels.size(); ++i) {
-    Term both = term(f.of[0], Shape::Equal, {f.of[0].levels[i]});
+    Term both = atLevel(f.of[0], i);
     terms.push_back(both);
     both.factors.push_back(powerOrLog(f.of[1], f.fixed[0]).factors[0]);
     terms.push_back(both);
@@ -153,9 +161,9 @@ TermGroup switched(const Form& f, std::span<const double>) {
 TermGroup switchedDecay(const Form& f, std::span<const double> inner) {
   std::vector<Term> terms;
   for (std::size_t i = 0; i < f.of[0].levels.size(); ++i) {
-    Term both = term(f.of[0], Shape::Equal, {f.of[0].levels[i]});
+    Term both = atLevel(f.of[0], i);
     if (i > 0) terms.push_back(both);
-    both.factors.push_back({f.of[1].name, Shape::Decay, {inner[0], f.fixed[0]}});
+    both.factors.push_back(factorOf(f.of[1].name, Basis::Decay, {inner[0]}));
     terms.push_back(both);
   }
   return group(f, std::move(terms));
@@ -163,8 +171,8 @@ TermGroup switchedDecay(const Form& f, std::span<const double> inner) {
 
 /// exp(−x/τ) · y^q
 TermGroup decayTimes(const Form& f, std::span<const double> inner) {
-  Term both = term(f.of[0], Shape::Decay, {inner[0], f.fixed[0]});
-  both.factors.push_back(powerOrLog(f.of[1], f.fixed[1]).factors[0]);
+  Term both = term(f.of[0], Basis::Decay, {inner[0]});
+  both.factors.push_back(powerOrLog(f.of[1], f.fixed[0]).factors[0]);
   return group(f, {both});
 }
 
@@ -240,33 +248,37 @@ void addHinges(const CovariateInfo& x, std::vector<Form>& forms) {
 
 /// tan² is the lengthening of a footprint's square, 1/cos that of a path through a layer.
 void addAngles(const CovariateInfo& x, std::vector<Form>& forms) {
-  constexpr double kDegree = std::numbers::pi / 180.0;
+  constexpr double kRadian = 180.0 / std::numbers::pi;
   const double largest = std::max(std::abs(least(x)), std::abs(most(x)));
   const bool is_in_radians = x.unit == "rad" || (x.unit.empty() && largest <= 0.5 * std::numbers::pi);
-  const double unit = is_in_radians ? 1.0 : kDegree;
-  if (x.nature != Nature::Angle || largest * unit > 88.0 * kDegree) return;  // they have no end at 90°
+  const double unit = is_in_radians ? kRadian : 1.0;
+  if (x.nature != Nature::Angle || largest * unit > 88.0) return;  // they have no end at 90°
   forms.push_back(form(fmt::format("tan² of {}", x.name), {x}, tanSquared, {}, {unit}));
   forms.push_back(form(fmt::format("1/cos − 1 of {}", x.name), {x}, secant, {}, {unit}));
 }
 
-/// Where exponentials begin: at 0 if the data are near it.
-double originOf(const CovariateInfo& x) { return least(x) >= 0.0 && least(x) < span(x) ? 0.0 : least(x); }
-
+/// What has fallen by e⁸ before the first row has no size that rows could tell.
+double shortest(const CovariateInfo& x, double finest) {
+  return std::max({span(x) / finest, std::abs(least(x)) / 8.0, std::abs(most(x)) / 80.0});
+}
 Inner timeConstant(const CovariateInfo& x, double finest, int count) {
-  return {geometric(span(x) / finest, 2.0 * span(x), count), true, 1};
+  const double fastest = shortest(x, finest);
+  return {geometric(fastest, std::max(2.0 * span(x), 1.6 * fastest), count), true, 1};
 }
 
 /// As a camera warms up, whose housing follows its sensor. Fewer rows hardly tell four numbers.
 void addTwoExponentials(const CovariateInfo& x, std::vector<Form>& forms) {
   constexpr std::size_t kFewestRows = 200;
   if (x.nature != Nature::Time || x.rows < kFewestRows) return;
-  const Inner fast{geometric(span(x) / 100.0, span(x) / 8.0, 9), true, 1};
+  const double fastest = shortest(x, 100.0);
+  if (fastest >= span(x) / 8.0) return;
+  const Inner fast{geometric(fastest, span(x) / 8.0, 9), true, 1};
   const Inner slow{geometric(span(x) / 6.0, 2.0 * span(x), 6), true, 1};
-  forms.push_back(form(fmt::format("two exponentials in {}", x.name), {x}, decays, {fast, slow}, {originOf(x)}));
+  forms.push_back(form(fmt::format("two exponentials in {}", x.name), {x}, decays, {fast, slow}));
 }
 
 bool isContinuous(const CovariateInfo& x) {
-  return x.levels.empty() && x.nature != Nature::Category && x.nature != Nature::Index;
+  return x.levels.empty() && x.nature != Nature::Index;
 }
 
 std::vector<double> usablePowers(const CovariateInfo& x) {
@@ -326,9 +338,7 @@ std::vector<FittedForm> crossedWith(const FittedForm& one, const CovariateInfo& 
 
 std::vector<Form> formsIn(const CovariateInfo& x) {
   std::vector<Form> forms;
-  if (x.nature == Nature::Category || x.levels.size() == 2) {
-    return {form(fmt::format("a value for each {}", x.name), {x}, levels)};
-  }
+  if (x.levels.size() == 2) return {form(fmt::format("a value for each {}", x.name), {x}, levels)};
   if (x.quantiles.empty() || span(x) <= 0.0) return forms;
   if (x.nature == Nature::Rate) return {form(powerInWords(x, 1.0), {x}, powers, {}, {1.0})};
   if (x.nature == Nature::Index) {
@@ -344,7 +354,7 @@ std::vector<Form> formsIn(const CovariateInfo& x) {
   forms.push_back(form(fmt::format("parabola in {}", x.name), {x}, powers, {}, {1.0, 2.0}));
   addAngles(x, forms);
   forms.push_back(
-      form(fmt::format("exponential in {}", x.name), {x}, decay, {timeConstant(x, 40.0, 20)}, {originOf(x)}));
+      form(fmt::format("exponential in {}", x.name), {x}, decay, {timeConstant(x, 40.0, 20)}));
   if (auto places = stepPlaces(x); !places.empty()) {
     forms.push_back(form(fmt::format("step in {}", x.name), {x}, step, {{std::move(places), false, 2}}));
   }
@@ -364,9 +374,7 @@ std::vector<Form> formsIn(const CovariateInfo& x) {
 
 std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
   std::vector<Form> forms;
-  const auto isNamed = [](const CovariateInfo& x) {
-    return x.nature == Nature::Category || x.levels.size() == 2;
-  };
+  const auto isNamed = [](const CovariateInfo& x) { return x.levels.size() == 2; };
   if (isNamed(a) && isNamed(b)) return forms;
   if (isNamed(a) || isNamed(b)) {
     const CovariateInfo &names = isNamed(a) ? a : b, &x = isNamed(a) ? b : a;
@@ -375,7 +383,7 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
                            switched, {}, {power}));
     if (isContinuous(x) && names.levels.size() <= kMostSwitched) {
       forms.push_back(form(fmt::format("exponential in {} for each {}", x.name, names.name), {names, x},
-                           switchedDecay, {timeConstant(x, 40.0, 12)}, {originOf(x)}));
+                           switchedDecay, {timeConstant(x, 40.0, 12)}));
     }
     return forms;
   }
@@ -400,7 +408,7 @@ std::vector<Form> formsIn(const CovariateInfo& a, const CovariateInfo& b) {
     addChangingHarmonics(x, y, usablePowers(y), forms);
     for (const double q : x.nature == Nature::Time ? usablePowers(y) : std::vector{1.0}) {
       forms.push_back(form(fmt::format("exponential in {} · {}", x.name, powerInWords(y, q)), {x, y},
-                           decayTimes, {timeConstant(x, 20.0, 8)}, {originOf(x), q}));
+                           decayTimes, {timeConstant(x, 20.0, 8)}, {q}));
     }
   }
   return forms;

@@ -343,7 +343,7 @@ namespace {
 bool isSimpler(const Explanation& one, const Explanation& other) {
   const auto isStraight = [](const Explanation& e) {
     const auto& terms = e.fitted.group.terms;
-    return terms.size() == 1 && terms[0].factors.size() == 1 && terms[0].factors[0].shape == Shape::Power &&
+    return terms.size() == 1 && terms[0].factors.size() == 1 && terms[0].factors[0].basis == Basis::Power &&
            terms[0].factors[0].numbers[0] == 1.0;
   };
   if (one.fitted.group.is_rare != other.fitted.group.is_rare) return other.fitted.group.is_rare;

@@ -3,100 +3,85 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
+
+#include "sim/terms/words.h"
 
 namespace toftwin::discover {
 namespace {
 
-double hat(double x, double a, double b, double c) {
-  if (x <= b) return a >= b || x <= a ? (a >= b ? 1.0 : 0.0) : (x - a) / (b - a);
-  return c <= b || x >= c ? (c <= b ? 1.0 : 0.0) : (c - x) / (c - b);
+std::string argumentInWords(const terms::Argument& of) {
+  std::string words;
+  for (const terms::Argument::Part& part : of.parts) {
+    words += part.weight < 0.0 ? "−" : words.empty() ? "" : " + ";
+    if (std::abs(part.weight) != 1.0) words += fmt::format("{:.4g} ", std::abs(part.weight));
+    words += part.covariate;
+  }
+  return of.parts.size() == 1 && of.parts.front().weight == 1.0 ? words : "(" + words + ")";
+}
+
+/// −x without its sign where it has one.
+std::string negated(terms::Argument of) {
+  for (terms::Argument::Part& part : of.parts) part.weight = -part.weight;
+  return argumentInWords(of);
+}
+
+std::string powerInWords(const std::string& x, double power) {
+  if (power == 1.0) return x;
+  if (power == -1.0) return "1/" + x;
+  if (power == 0.5) return "√" + x;
+  if (power == -0.5) return "1/√" + x;
+  return power < 0.0 ? fmt::format("1/{}^{:.4g}", x, -power) : fmt::format("{}^{:.4g}", x, power);
 }
 
 }  // namespace
 
-double Factor::at(double x) const {
-  constexpr double kTurn = 2.0 * std::numbers::pi;
-  const auto number = [&](std::size_t i) { return numbers[i]; };
-  switch (shape) {
-    case Shape::Power:
-      return number(0) == 1.0 ? x : std::pow(x, number(0));
-    case Shape::Log:
-      return std::log(x);
-    case Shape::Decay:
-      return std::exp(-(x - number(1)) / number(0));
-    case Shape::Sine:
-      return std::sin(kTurn * x / number(0));
-    case Shape::Cosine:
-      return std::cos(kTurn * x / number(0));
-    case Shape::Step:
-      return x >= number(0) ? 1.0 : 0.0;
-    case Shape::Sigmoid:
-      return 1.0 / (1.0 + std::exp(-(x - number(0)) / number(1)));
-    case Shape::Hinge:
-      return std::max(0.0, number(1) * (x - number(0)));
-    case Shape::TanSquared:
-      return std::pow(std::tan(number(0) * x), 2);
-    case Shape::Secant:
-      return 1.0 / std::cos(number(0) * x) - 1.0;
-    case Shape::Hat:
-      return hat(x, number(0), number(1), number(2));
-    case Shape::Equal:
-      return x == number(0) ? 1.0 : 0.0;
-    case Shape::Modulo: {
-      const double left = std::fmod(std::floor(x), number(0));
-      return (left < 0.0 ? left + number(0) : left) == number(1) ? 1.0 : 0.0;
-    }
-  }
-  return 0.0;
+Factor factorOf(std::string covariate, Basis basis, std::vector<double> numbers) {
+  return {.basis = basis, .of = {.parts = {{1.0, std::move(covariate)}}}, .numbers = std::move(numbers)};
 }
 
 double Term::at(const std::function<double(const std::string&)>& value) const {
   double product = 1.0;
-  for (const Factor& factor : factors) product *= factor.at(value(factor.covariate));
+  for (const Factor& factor : factors) {
+    double x = 0.0;
+    for (const terms::Argument::Part& part : factor.of.parts) x += part.weight * value(part.covariate);
+    product *= terms::valueOf(factor, x);
+  }
   return product;
 }
 
 std::string inWords(const Factor& factor) {
-  const auto& x = factor.covariate;
+  const std::string x = argumentInWords(factor.of);
   const auto number = [&](std::size_t i) { return fmt::format("{:.4g}", factor.numbers[i]); };
-  switch (factor.shape) {
-    case Shape::Power:
-      if (factor.numbers[0] == 1.0) return x;
-      if (factor.numbers[0] == -1.0) return "1/" + x;
-      if (factor.numbers[0] == -0.5) return "1/√" + x;
-      if (factor.numbers[0] < 0.0) return fmt::format("1/{}^{:.4g}", x, -factor.numbers[0]);
-      return factor.numbers[0] == 0.5 ? fmt::format("√{}", x) : fmt::format("{}^{}", x, number(0));
-    case Shape::Log:
-      return fmt::format("ln {}", x);
-    case Shape::Decay:
-      if (factor.numbers[1] == 0.0) return fmt::format("exp(−{}/{})", x, number(0));
-      return fmt::format("exp(−({} − {})/{})", x, number(1), number(0));
-    case Shape::Sine:
+  switch (factor.basis) {
+    case Basis::Power:
+      return powerInWords(x, factor.numbers[0]);
+    case Basis::Log:
+      return "ln " + x;
+    case Basis::Decay:
+      return fmt::format("exp(−{}/{})", x, number(0));
+    case Basis::Sine:
       return fmt::format("sin(2π {}/{})", x, number(0));
-    case Shape::Cosine:
+    case Basis::Cosine:
       return fmt::format("cos(2π {}/{})", x, number(0));
-    case Shape::Step:
+    case Basis::Step:
       return fmt::format("[{} ≥ {}]", x, number(0));
-    case Shape::Sigmoid:
+    case Basis::Sigmoid:
       return fmt::format("1/(1 + exp(−({} − {})/{}))", x, number(0), number(1));
-    case Shape::Hinge:
-      return factor.numbers[1] > 0.0 ? fmt::format("max(0, {} − {})", x, number(0))
-                                     : fmt::format("max(0, {} − {})", number(0), x);
-    case Shape::TanSquared:
+    case Basis::Hinge:
+      return factor.of.parts.front().weight < 0.0 ? fmt::format("max(0, {:.4g} − {})", -factor.numbers[0], negated(factor.of))
+                                     : fmt::format("max(0, {} − {})", x, number(0));
+    case Basis::Tangent2:
       return fmt::format("tan²({})", x);
-    case Shape::Secant:
+    case Basis::Secant:
       return fmt::format("(1/cos({}) − 1)", x);
-    case Shape::Hat:
-      return fmt::format("hat({}; {}, {}, {})", x, number(0), number(1), number(2));
-    case Shape::Equal:
-      return fmt::format("[{} = {}]", x, number(0));
-    case Shape::Modulo:
+    case Basis::Class:
       return fmt::format("[{} mod {} = {}]", x, number(0), number(1));
+    default:
+      return fmt::format("{}({}; {:.4g})", terms::wordOf(factor.basis).word, x, fmt::join(factor.numbers, ", "));
   }
-  return x;
 }
 
 std::string inWords(const Term& term) {
@@ -112,7 +97,8 @@ std::vector<std::string> covariatesOf(const TermGroup& group) {
   };
   for (const Term& term : group.terms) {
     if (!term.carrier.empty()) add(term.carrier.substr(0, term.carrier.find(':')));
-    for (const Factor& factor : term.factors) add(factor.covariate);
+    for (const Factor& factor : term.factors)
+      for (const terms::Argument::Part& part : factor.of.parts) add(part.covariate);
   }
   return names;
 }

@@ -13,34 +13,16 @@
 #include <toftwin/result.h>
 
 #include "calib/discover/evidence.h"
+#include "sim/terms/term.h"
 
 /// Functions of covariates: what an undeclared effect is made of.
 namespace toftwin::discover {
 
-enum class Shape {
-  Power,       ///< x^p                    numbers: p
-  Log,         ///< ln x
-  Decay,       ///< exp(−(x−x₀)/τ)         numbers: τ, x₀
-  Sine,        ///< sin(2π x/Λ)            numbers: Λ
-  Cosine,      ///< cos(2π x/Λ)            numbers: Λ
-  Step,        ///< 1 where x ≥ a, else 0  numbers: a
-  Sigmoid,     ///< 1/(1 + exp(−(x−a)/w))  numbers: a, w
-  Hinge,       ///< s (x − a) where that is positive, else 0   numbers: a, s = ±1
-  TanSquared,  ///< tan² of an angle    numbers: radians in its unit
-  Secant,      ///< 1/cos − 1 of an angle  numbers: radians in its unit
-  Hat,         ///< 0 at a, 1 at b, 0 at c, straight between; a = b or b = c: 1 beyond   numbers: a, b, c
-  Equal,       ///< 1 where x = a          numbers: a
-  Modulo       ///< 1 where ⌊x⌋ mod m = r  numbers: m, r
-};
+using terms::Basis;
+using terms::Factor;
 
-/// A function of one covariate.
-struct Factor {
-  std::string covariate{};
-  Shape shape = Shape::Power;
-  std::vector<double> numbers{};
-  [[nodiscard]] double at(double x) const;
-  bool operator==(const Factor&) const = default;
-};
+/// A function of one covariate, in the language that files and the simulator have, too.
+Factor factorOf(std::string covariate, Basis basis, std::vector<double> numbers);
 
 /// One column: a product of factors, acting at a stage. In the unit of the measured value per unit of its
 /// coefficient.
@@ -78,8 +60,7 @@ enum class Nature {
   Angle,     ///< tan² and 1/cos − 1 are looked for
   Index,     ///< counts frames: even and odd
   Rate,      ///< how fast something else changes: what goes with it goes straight
-  Share,     ///< of light, as multipath: no waves are looked for along it, and nothing that acts together with it
-  Category   ///< names without order
+  Share      ///< of light, as multipath: no waves are looked for along it, and nothing that acts together with it
 };
 
 /// How a covariate is spread over the data.

@@ -368,6 +368,41 @@ TEST_F(Rows, APatternGoesIntoTheModelAsStrongAsItWasFitted) {
   EXPECT_NEAR(size(offsets_mm), 0.5 * size(pattern.value), 1e-6);
 }
 
+/// A wave shorter than any knots, stripes, a checkerboard, a product: the simulator adds what the search fitted.
+TEST_F(Rows, WhatWasFoundGoesIntoTheModelAsItIs) {
+  const Made made = make("", tinyCamera());
+  const auto camera = sim::SensorModel::parse(tinyCamera(), "camera.toml");
+  Factor checker = factorOf("column", Basis::Class, {2.0, 1.0});
+  checker.of.parts.push_back({1.0, "row"});
+  Effect effect{.name = "shapes", .coefficient = {3.0, -2.0, 0.5, 1.5}};
+  effect.parts.push_back({.group = {"shapes", Kind::Generic,
+                                    {{{factorOf("range_m", Basis::Sine, {0.011})}, Stage::Range},
+                                     {{factorOf("column", Basis::Class, {3.0, 1.0})}, Stage::Range},
+                                     {{factorOf("time_s", Basis::Decay, {400.0}), factorOf("row", Basis::Power, {1.0})}, Stage::Range},
+                                     {{checker}, Stage::Range}}, 0}});
+  const auto learned = learnedEffectsOf(effect, made.rows, *camera);
+  ASSERT_EQ(learned.size(), 1U);
+  const auto& captures = made.campaign.captures;
+  const auto plain = NoiselessCamera::make(*camera, made.rows.effects(), captures);
+  const auto with = NoiselessCamera::make(*camera, withInserted(made.rows.effects(), learned.front().effect), captures);
+  ASSERT_TRUE(plain && with);
+  for (std::size_t c = 0; c < captures.size(); ++c) {
+    const Reading before = plain->read(captures[c], *made.lights[c]), after = with->read(captures[c], *made.lights[c]);
+    for (int y = 0; y < before.range_m.height(); ++y) {
+      for (int x = 0; x < before.range_m.width(); ++x) {
+        const auto value = [&](const std::string& name) {
+          if (name == "time_s") return captures[c].moment.since_power_on->in(second);
+          return name == "range_m" ? static_cast<double>(before.range_m(x, y)) : name == "column" ? 1.0 * x : 1.0 * y;
+        };
+        double sum = 0.0;
+        for (std::size_t t = 0; t < effect.coefficient.size(); ++t)
+          sum += effect.coefficient[t] * effect.parts[0].group.terms[t].at(value);
+        ASSERT_NEAR(1e3 * static_cast<double>(after.range_m(x, y) - before.range_m(x, y)), sum, 1e-3) << x << ", " << y;
+      }
+    }
+  }
+}
+
 /// Where the light's zero lies is fitted beforehand. That is no effect of the file, so that a phase of each
 /// frequency may still be missing in it.
 TEST_F(Rows, ADelayThatIsKnownHidesNoFrequencyOffset) {

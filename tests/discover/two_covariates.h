@@ -86,7 +86,7 @@ inline Context contextOf(const TwoCovariates::Hidden& hidden, std::uint64_t seed
   return context;
 }
 
-inline Factor powerOf(std::string covariate, double power) { return {std::move(covariate), Shape::Power, {power}}; }
+inline Factor powerOf(std::string covariate, double power) { return factorOf(std::move(covariate), Basis::Power, {power}); }
 inline FittedForm formOf(std::string name, std::vector<Factor> factors) {
   FittedForm form;
   form.group = {std::move(name), Kind::Generic, {{.factors = std::move(factors), .stage = Stage::Range}}, 0};

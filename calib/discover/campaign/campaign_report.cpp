@@ -84,7 +84,7 @@ std::string numbersInWords(const FoundEffect& one) {
     return fmt::format("{}{}{}; it is not in model.toml", numbers, numbers.empty() ? "" : "; ", why);
   }
   if (!fitted.empty()) return fmt::format("{}", fmt::join(fitted, "; "));
-  return numbers.empty() ? "a table: see model.toml" : fmt::format("a table of {}", numbers);
+  return numbers.empty() ? "see its terms in model.toml" : numbers;
 }
 
 compare::TableBlock effectTable(const CampaignFinding& finding) {

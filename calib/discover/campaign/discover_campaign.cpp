@@ -100,6 +100,15 @@ Result<JudgedModel> fileWith(const JudgedCampaign& judged, double delay_mm) {
   return model;
 }
 
+/// The camera file that was written, read as whoever loads it reads it: that is what is judged, not what it was made of.
+/// An offset of the range stands in it.
+Result<JudgedModel> asWritten(const std::string& model_toml) {
+  const auto model = sim::SensorModel::parse(model_toml, "model.toml");
+  if (!model)
+    return Error{Error::Code::Internal, "what was found cannot be written as a camera file: " + model.error().message};
+  return JudgedModel{.effects = effectsWithoutNoise(*model)};
+}
+
 /// What the judgement is without locked captures that stood off their poses, where others are left.
 Result<> tellLockedOff(const JudgedCampaign& locked, const JudgedCampaign& open, const JudgedModels& models,
                        CampaignFinding& finding) {
@@ -332,7 +341,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
   notePatterns(*round.rows, finding);
   noteMissingRawExposures(declared.model, finding);
   addNextCaptures({round.declared, lit, finding.finding.scales}, *round.rows, finding.effects);
-  const Zero beyond = finding.zero;
+  const double gain_percent = finding.zero.gain_percent;
   finding.zero.delay_mm += declared.delay_mm, finding.zero.gain_percent += declared.unit_percent;
   if (steps) addSteps(job, declared.model, *steps, finding);
   if (apart) addFramesApart(*apart, finding);
@@ -345,10 +354,10 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
     if (!before) return before.error();
     const auto with_zero = fileWith(searched, finding.zero.delay_mm);
     if (!with_zero) return with_zero.error();
-    const JudgedModel after{withDelay(declared.model, round.refitted.effects, beyond.delay_mm),
-                            beyond.hasOffset() ? beyond.offset_mm : 0.0, beyond.gain_percent,
-                            fittedShareOf(round, finding.effects)};
-    if (auto done = judgeLocked(job, *campaign, searched, {*before, *with_zero, after}, finding); !done)
+    auto after = asWritten(finding.model_toml);
+    if (!after) return after.error();
+    after->gain_percent = gain_percent, after->fitted_share = fittedShareOf(round, finding.effects);
+    if (auto done = judgeLocked(job, *campaign, searched, {*before, *with_zero, *std::move(after)}, finding); !done)
       return done.error();
     keepIfWorse(files->text, declared, finding);
   } else {

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // What was found without a name, in forms that the simulator has.
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <functional>
+#include <iterator>
 #include <numbers>
 #include <numeric>
 #include <set>
@@ -25,22 +25,9 @@ using terms::Quantity;
 
 sim::AnyEffect learnedFrom(std::vector<terms::Term> all) { return sim::Learned{.title = {}, .terms = std::move(all)}; }
 
-/// Offsets and gains over one or two covariates, either of which may be none.
-struct LearnedTable {
-  sim::KnotTable table{};
-  std::vector<double> offsets_mm{}, gains_percent{};
-
-  [[nodiscard]] sim::AnyEffect as(Quantity of_offsets, Quantity of_gains) const {
-    std::vector<terms::Term> all = sim::termsOf(table, offsets_mm, of_offsets);
-    for (terms::Term& term : sim::termsOf(table, gains_percent, of_gains)) all.push_back(std::move(term));
-    return learnedFrom(std::move(all));
-  }
-  [[nodiscard]] sim::AnyEffect inRange() const { return as(Quantity::RangeMm, Quantity::AmplitudePercent); }
-};
-
 bool isSimulators(const std::string& covariate) { return sim::learnedCovariate(covariate) != nullptr; }
 
-/// Where the table has knots: the covariate's levels, or evenly over it and where its values lie.
+/// Where a table has knots: the covariate's levels, or evenly over it and where its values lie.
 std::vector<double> tableKnotsOf(const CovariateInfo& covariate, std::size_t even) {
   if (!covariate.levels.empty()) return covariate.levels;
   std::vector<double> knots = covariate.quantiles;
@@ -87,7 +74,8 @@ std::vector<Along> alongOf(const Effect& effect) {
   const std::vector<Term> terms = termsOf(effect);
   for (std::size_t i = 0; i < std::min(terms.size(), effect.coefficient.size()); ++i) {
     std::set<std::string> names;
-    for (const Factor& factor : terms[i].factors) names.insert(factor.covariate);
+    for (const Factor& factor : terms[i].factors)
+      for (const terms::Argument::Part& part : factor.of.parts) names.insert(part.covariate);
     const std::vector<std::string> covariates(names.begin(), names.end());
     auto found = std::ranges::find(all, covariates, &Along::covariates);
     if (found == all.end()) found = all.insert(all.end(), Along{covariates});
@@ -96,87 +84,63 @@ std::vector<Along> alongOf(const Effect& effect) {
   return all;
 }
 
-/// Whether a decoded image no longer tells it, but the light does.
-bool onlyLightKnows(const std::string& covariate) {
-  return !sim::isKnownAt(terms::Stage::Range, *sim::learnedCovariate(covariate));
+/// What the simulator adds for a term, in the decoded image or in the light, where a delay is nearly the same error of
+/// the range; nothing for what is neither.
+std::optional<terms::Term> asSimulated(const std::pair<Term, double>& one, bool in_light) {
+  const bool moves = movesRange(one.first);
+  if (!moves && !changesGain(one.first)) return std::nullopt;
+  const Quantity of_range = moves ? Quantity::RangeMm : Quantity::AmplitudePercent;
+  const Quantity of_light = moves ? Quantity::DelayMm : Quantity::LightPercent;
+  return terms::Term{.quantity = in_light ? of_light : of_range, .coefficient = one.second, .factors = one.first.factors};
 }
 
-/// The same in the light, where a delay is nearly an error of the range. Nothing for what light does not
-/// know: electrons, and what delays a pulse.
-std::optional<sim::AnyEffect> inLight(const LearnedTable& learned, bool has_phasors) {
-  const auto isKnown = [](const std::string& covariate) {
-    return covariate.empty() || sim::isKnownAt(terms::Stage::Light, *sim::learnedCovariate(covariate));
+/// Whether terms over these covariates act in the light; nothing: neither there nor in the decoded image are they known.
+/// What a delay does to the range is not the same everywhere, where waveforms make it another thing.
+std::optional<bool> isInLight(const Along& along, bool has_phasors) {
+  const auto isIn = [](terms::Stage stage) {
+    return [stage](const std::string& name) { return sim::isKnownAt(stage, *sim::learnedCovariate(name)); };
   };
-  if (!isKnown(learned.table.over) || !isKnown(learned.table.and_over)) return std::nullopt;
-  if (!has_phasors && !learned.offsets_mm.empty()) return std::nullopt;
-  return learned.as(Quantity::DelayMm, Quantity::LightPercent);
-}
-
-/// A table over one or two covariates: of the decoded image where that tells them, else of the light.
-std::optional<sim::AnyEffect> tableOf(const Along& along, std::span<const CovariateInfo> covariates,
-                                      bool has_phasors) {
+  if (!std::ranges::all_of(along.covariates, isSimulators)) return std::nullopt;
   const bool moves = std::ranges::any_of(along.terms, [](const auto& one) { return movesRange(one.first); });
-  const bool dims = std::ranges::any_of(along.terms, [](const auto& one) { return changesGain(one.first); });
-  if (along.covariates.empty() || along.covariates.size() > 2 || !(moves || dims)) return std::nullopt;
-  std::array<const CovariateInfo*, 2> info{};
-  for (std::size_t i = 0; i < along.covariates.size(); ++i) {
-    info[i] = infoNamed(covariates, along.covariates[i]);
-    if (info[i] == nullptr || !isSimulators(along.covariates[i])) return std::nullopt;
-  }
-  const bool has_two = along.covariates.size() == 2;
-  LearnedTable learned{.table = {.over = along.covariates[0], .knots = tableKnotsOf(*info[0], has_two ? 24 : 256)}};
-  if (has_two) learned.table.and_over = along.covariates[1], learned.table.and_knots = tableKnotsOf(*info[1], 24);
-  for (const double x : learned.table.knots) {
-    for (const double y : has_two ? learned.table.and_knots : std::vector{0.0}) {
-      const auto at = [&](const std::string& name) { return name == along.covariates[0] ? x : y; };
-      const auto within = [](double value, double least, double most) {
-        return std::isfinite(value) ? std::clamp(value, least, most) : 0.0;
-      };
-      if (moves) learned.offsets_mm.push_back(within(along.sum(movesRange, at), -1e4, 1e4));
-      if (dims) learned.gains_percent.push_back(within(along.sum(changesGain, at), -100.0, 1e4));
-    }
-  }
-  // What a delay does to the range is not the same everywhere, where waveforms make it another thing.
-  const bool is_delay = std::ranges::all_of(along.terms, [](const auto& one) {
+  const bool is_delay = moves && std::ranges::all_of(along.terms, [](const auto& one) {
     return !movesRange(one.first) || one.first.carrier == kDelayCarrier;
   });
-  const bool needs_light = std::ranges::any_of(along.covariates, onlyLightKnows);
-  if (needs_light || (moves && is_delay)) {
-    auto light = inLight(learned, has_phasors);
-    if (light || needs_light) return light;
-  }
-  return learned.inRange();
+  const bool light_can = std::ranges::all_of(along.covariates, isIn(terms::Stage::Light)) && (has_phasors || !moves);
+  const bool range_can = std::ranges::all_of(along.covariates, isIn(terms::Stage::Range));
+  if (light_can && (is_delay || !range_can)) return true;
+  return range_can ? std::optional{false} : std::nullopt;
 }
 
-/// How fast a temperature changes no frame says, but when it was: as a table over the time of these captures.
-std::optional<sim::AnyEffect> tableOverTime(const Along& along, const CampaignRows& rows) {
-  if (along.covariates.size() != 1 || !along.covariates.front().starts_with(kRatePrefix)) return std::nullopt;
-  LearnedTable learned{.table = {.over = "time_s"}};
-  std::vector<double> gains;
+/// How fast a temperature changes no frame says, but when it was: as a curve over the time of these captures.
+std::vector<terms::Term> overTime(const Along& along, const CampaignRows& rows) {
+  if (along.covariates.size() != 1 || !along.covariates.front().starts_with(kRatePrefix)) return {};
+  sim::KnotTable table{.over = "time_s"};
+  std::vector<double> offsets_mm, gains_percent;
   for (const auto& [time, rate] : rows.overTime(along.covariates.front())) {
     const auto at = [r = rate](const std::string&) { return r; };
-    learned.table.knots.push_back(time);
-    learned.offsets_mm.push_back(std::clamp(along.sum(movesRange, at), -1e4, 1e4));
-    gains.push_back(std::clamp(along.sum(changesGain, at), -100.0, 1e4));
+    table.knots.push_back(time);
+    offsets_mm.push_back(along.sum(movesRange, at)), gains_percent.push_back(along.sum(changesGain, at));
   }
-  if (std::ranges::any_of(gains, [](double one) { return one != 0.0; })) learned.gains_percent = std::move(gains);
-  return learned.inRange();
+  std::vector<terms::Term> all = sim::termsOf(table, offsets_mm, Quantity::RangeMm);
+  for (terms::Term& term : sim::termsOf(table, gains_percent, Quantity::AmplitudePercent)) all.push_back(std::move(term));
+  return all;
 }
 
 /// A pattern of pixels, as a table over columns and rows with a knot in the middle of each cell. `strength`:
 /// the pattern's coefficient beside everything else that was found.
 sim::AnyEffect tableOf(const PixelPattern& pattern, double strength) {
-  LearnedTable learned{.table = {.over = "column", .and_over = "row"}};
+  sim::KnotTable table{.over = "column", .and_over = "row"};
   const CellGrid& grid = pattern.grid;
   for (int i = 0; i < grid.columns; ++i)
-    learned.table.knots.push_back(i * grid.cell_width + 0.5 * (grid.cell_width - 1));
+    table.knots.push_back(i * grid.cell_width + 0.5 * (grid.cell_width - 1));
   for (int i = 0; i < grid.rows; ++i)
-    learned.table.and_knots.push_back(i * grid.cell_height + 0.5 * (grid.cell_height - 1));
-  std::vector<double>& table = pattern.carrier == kGainCarrier ? learned.gains_percent : learned.offsets_mm;
+    table.and_knots.push_back(i * grid.cell_height + 0.5 * (grid.cell_height - 1));
+  std::vector<double> values;
   for (int column = 0; column < grid.columns; ++column)
     for (int row = 0; row < grid.rows; ++row)
-      table.push_back(strength * pattern.value[static_cast<std::size_t>(row * grid.columns + column)]);
-  return learned.inRange();
+      values.push_back(strength * pattern.value[static_cast<std::size_t>(row * grid.columns + column)]);
+  const bool is_gain = pattern.carrier == kGainCarrier;
+  return learnedFrom(sim::termsOf(table, values, is_gain ? Quantity::AmplitudePercent : Quantity::RangeMm));
 }
 
 /// Coefficients of a carrier's two parts, where all of its terms are constant.
@@ -290,20 +254,26 @@ std::optional<sim::AnyEffect> shiftOf(const Along& along, std::span<const Covari
   return learnedFrom(sim::termsOf(table, outward_px, Quantity::OutwardPx));
 }
 
-/// The tables of all covariates that its terms go with. One part of a sum says nothing without the others: all or none.
-std::vector<LearnedEffect> tablesOf(const std::vector<Along>& all, const CampaignRows& rows, bool has_phasors) {
-  std::vector<LearnedEffect> tables;
-  const std::vector<CovariateInfo> covariates = rows.covariates();
+/// What it does to ranges and amplitudes, as it was found. One part of a sum says nothing without the others: all or none.
+std::vector<LearnedEffect> asFound(const std::vector<Along>& all, const CampaignRows& rows, bool has_phasors) {
+  std::vector<terms::Term> of_light, of_range;
   for (const Along& along : all) {
     const bool is_of_range = std::ranges::any_of(
         along.terms, [](const auto& one) { return movesRange(one.first) || changesGain(one.first); });
     if (along.covariates.empty() || !is_of_range) continue;
-    auto table = tableOf(along, covariates, has_phasors);
-    if (!table) table = tableOverTime(along, rows);
-    if (!table) return {};
-    tables.push_back({*std::move(table)});
+    if (const auto in_light = isInLight(along, has_phasors)) {
+      for (const auto& one : along.terms)
+        if (auto term = asSimulated(one, *in_light)) (*in_light ? of_light : of_range).push_back(*std::move(term));
+      continue;
+    }
+    auto over_time = overTime(along, rows);
+    if (over_time.empty()) return {};
+    std::ranges::move(over_time, std::back_inserter(of_range));
   }
-  return tables;
+  std::vector<LearnedEffect> learned;
+  for (auto* terms : {&of_light, &of_range})
+    if (!terms->empty()) learned.push_back({learnedFrom(std::move(*terms))});
+  return learned;
 }
 
 }  // namespace
@@ -312,7 +282,7 @@ std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const Campaign
                                             const sim::SensorModel& model) {
   const std::vector<CovariateInfo> covariates = rows.covariates();
   const std::vector<Along> all = alongOf(effect);
-  std::vector<LearnedEffect> learned = tablesOf(all, rows, model.hasPhasors());
+  std::vector<LearnedEffect> learned = asFound(all, rows, model.hasPhasors());
   for (const Along& along : all)
     if (const auto shift = shiftOf(along, covariates)) learned.push_back({*shift});
   for (const Along& along : all) {

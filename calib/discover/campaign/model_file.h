@@ -18,9 +18,8 @@ struct LearnedEffect {
   sim::AnyEffect effect;
   std::vector<std::string> free{};
 };
-/// An effect that the finder named by its covariates, in forms that the simulator knows: tables over one or
-/// two covariates, a kernel of light from neighbours, a pattern of pixels, constant charges in raw exposures,
-/// stray light. Nothing where there is no form. `rows`: with everything in their model that was found by
+/// An effect that the finder named by its covariates, in forms that the simulator knows: its terms as they were found, a
+/// kernel of light from neighbours, a pattern of pixels, constant charges in raw exposures, stray light. Nothing where there is no form. `rows`: with everything in their model that was found by
 /// name.
 std::vector<LearnedEffect> learnedEffectsOf(const Effect& effect, const CampaignRows& rows,
                                             const sim::SensorModel& model);

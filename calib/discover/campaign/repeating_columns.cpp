@@ -26,7 +26,7 @@ std::size_t periodOf(std::span<const std::pair<Term, double>> terms) {
   std::size_t period = 1;
   for (const auto& [term, coefficient] : terms)
     for (const Factor& factor : term.factors)
-      if (isOfConverter(term) && factor.shape == Shape::Modulo)
+      if (isOfConverter(term) && factor.basis == Basis::Class)
         period = std::lcm(period, static_cast<std::size_t>(factor.numbers[0]));
   return period;
 }
@@ -41,8 +41,8 @@ std::vector<TermGroup> repeatingColumns(std::span<const CovariateInfo> covariate
     for (const char* part : {"in_phase", "quadrature", "gain"}) {
       const bool is_gain = std::string_view{part} == "gain";
       for (int column = is_gain ? 1 : 0; column < period; ++column) {
-        const Factor factor{
-            std::string{kColumn}, Shape::Modulo, {static_cast<double>(period), static_cast<double>(column)}};
+        const Factor factor =
+            factorOf(std::string{kColumn}, Basis::Class, {static_cast<double>(period), static_cast<double>(column)});
         group.terms.push_back({{factor}, Stage::Samples, partOf(part)});
       }
     }

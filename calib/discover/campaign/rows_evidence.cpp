@@ -32,10 +32,10 @@ class Factors {
     Term rest{{}, term.stage, term.carrier};
     double scale = 1.0;
     for (const Factor& factor : term.factors) {
-      const auto place = placeOf(factor);
-      if (!place) return {rest, 0.0};
-      if (covariates_.is_same[*place])
-        scale *= known(factor.at(static_cast<double>(column(*place)[0])));
+      const auto places = placesOf(factor);
+      if (!places) return {rest, 0.0};
+      if (std::ranges::all_of(*places, [&](std::size_t place) { return covariates_.is_same[place]; }))
+        scale *= known(terms::valueOf(factor, argumentOf(factor, *places)(0)));
       else
         rest.factors.push_back(factor);
     }
@@ -51,21 +51,29 @@ class Factors {
 
  private:
   static double known(double value) { return std::isfinite(value) ? value : 0.0; }
-  [[nodiscard]] std::optional<std::size_t> placeOf(const Factor& factor) const {
-    const auto found = std::ranges::find(covariates_.names, factor.covariate);
-    if (found == covariates_.names.end() || covariates_.values.rows() == 0) return std::nullopt;
-    return static_cast<std::size_t>(found - covariates_.names.begin());
+  /// Of the covariates of its argument; nothing where one is not known.
+  [[nodiscard]] std::optional<std::vector<std::size_t>> placesOf(const Factor& factor) const {
+    std::vector<std::size_t> places;
+    for (const terms::Argument::Part& part : factor.of.parts) {
+      const auto found = std::ranges::find(covariates_.names, part.covariate);
+      if (found == covariates_.names.end() || covariates_.values.rows() == 0) return std::nullopt;
+      places.push_back(static_cast<std::size_t>(found - covariates_.names.begin()));
+    }
+    return places;
   }
-  [[nodiscard]] Eigen::MatrixXf::ConstColXpr column(std::size_t place) const {
-    return covariates_.values.col(static_cast<Eigen::Index>(place));
+  [[nodiscard]] Eigen::VectorXd argumentOf(const Factor& factor, const std::vector<std::size_t>& places) const {
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(covariates_.values.rows());
+    for (std::size_t i = 0; i < places.size(); ++i)
+      x += factor.of.parts[i].weight * covariates_.values.col(static_cast<Eigen::Index>(places[i])).cast<double>();
+    return x;
   }
   const Eigen::VectorXf& valuesOf(const Factor& factor) {
     for (const auto& [other, values] : known_)
       if (other == factor) return values;
-    const auto x = column(*placeOf(factor));
+    const Eigen::VectorXd x = argumentOf(factor, *placesOf(factor));
     Eigen::VectorXf values(x.size());
     for (Eigen::Index i = 0; i < values.size(); ++i)
-      values[i] = static_cast<float>(known(factor.at(static_cast<double>(x[i]))));
+      values[i] = static_cast<float>(known(terms::valueOf(factor, x[i])));
     return known_.emplace_back(factor, std::move(values)).second;
   }
 

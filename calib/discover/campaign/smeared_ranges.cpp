@@ -63,7 +63,7 @@ std::optional<LearnedEffect> smearOf(std::span<const std::pair<Term, double>> te
                                      const std::vector<double>& amplitudes) {
   const auto isSmear = [](const auto& one) { return one.first.carrier.starts_with(kSmearedCarrier); };
   // It is one by amplitude; what goes with something else, too, it has no number for.
-  const auto isByAmplitude = [](const Factor& factor) { return factor.covariate == "amplitude_e"; };
+  const auto isByAmplitude = [](const Factor& factor) { return factor.of.parts.front().covariate == "amplitude_e"; };
   if (std::ranges::none_of(terms, isSmear)) return std::nullopt;
   for (const auto& one : terms)
     if (isSmear(one) && !std::ranges::all_of(one.first.factors, isByAmplitude)) return std::nullopt;
