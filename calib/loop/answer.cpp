@@ -198,8 +198,22 @@ std::vector<std::string> readingsOf(const Discovery& d) {
   return out;
 }
 
+/// Where the reference begins anew, whether or not the errors differ there, and what that says of all that is left.
+std::string overlapText(const Discovery& d) {
+  std::vector<std::string> lines;
+  for (const std::size_t begin : d.all.begins) lines.push_back(std::to_string(begin));
+  const std::string& unit = d.readings.unit;
+  const Overlap& overlap = *d.overlap;
+  return fmt::format("The reference begins anew at line {}: {} series. Where they have the same {} (to {}, {}), a later one reads {} {} in the mean, and row by row "
+                     "they differ by {} more: no function of these columns leaves less than {} there.",
+                     joined(lines), lines.size() + 1, d.readings.reference_name.empty() ? "reference" : d.readings.reference_name, quantityText(overlap.apart, unit),
+                     counted(overlap.rows, "row"), quantityText(std::abs(overlap.mean), unit), overlap.mean < 0.0 ? "lower" : "higher",
+                     quantityText(overlap.deviation, unit), quantityText(overlap.least(), unit));
+}
+
 std::vector<std::string> cautionsOf(const Discovery& d) {
   std::vector<std::string> out;
+  if (d.overlap && !d.all.begins.empty()) out.push_back(overlapText(d));
   if (!d.seen.has_truth) out.emplace_back("The table has no reference: what is constant, and a gain, cannot be known. Add a column of the true value.");
   for (const Effect& effect : d.mean.effects) {
     const Covariate* c = covariateOf(d, effect.shape.covariates.front());

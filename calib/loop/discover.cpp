@@ -128,6 +128,23 @@ Eigen::VectorXd beyondOpen(const Discovery& d, const Evidence& rows) {
   return robustLeastSquares(e, lessEffects(e, d.mean.effects), Eigen::MatrixXd(e.rows(), 0)).residual;
 }
 
+/// The errors less what goes with columns, but not less series' offsets.
+Eigen::VectorXd lessCurves(const Discovery& d) {
+  std::vector<Effect> curves = d.mean.effects;
+  std::erase_if(curves, [](const Effect& effect) { return isSeries(effect); });
+  return lessEffects(d.open.evidence, curves);
+}
+
+/// Of each open row, by where the reference begins anew in the file.
+std::vector<int> seriesNumbers(const Discovery& d) {
+  std::vector<int> series;
+  for (const std::size_t row : d.open.row) {
+    const std::size_t line = d.readings.line[row];
+    series.push_back(static_cast<int>(std::ranges::count_if(d.all.begins, [&](std::size_t begin) { return line >= begin; })));
+  }
+  return series;
+}
+
 std::optional<Explanation> explainShare(const Discovery& d, const DiscoverOptions& options) {
   Evidence e = ungrouped(d.all.evidence);
   e.y.setZero();
@@ -182,6 +199,7 @@ Result<Discovery> discover(table::Readings readings, const DiscoverOptions& opti
   const Noise noise = judgeNoise(d.open.evidence, columnsOf(d.open.evidence, d.mean.effects));
   d.noise = robustScale(noise.residual);
   d.repeats = repeatsOf(d.open.evidence);
+  d.overlap = overlapOf(d.open.evidence, lessCurves(d), seriesNumbers(d));
   if (auto written = writeModel(d); !written) return written.error();
   return d;
 }

@@ -8,6 +8,7 @@
 #include "calib/loop/explain.h"
 #include "calib/loop/ladder.h"
 #include "calib/loop/no_readings.h"
+#include "calib/loop/overlap.h"
 
 namespace toftwin::loop {
 
@@ -23,6 +24,7 @@ struct Discovery {
   bool has_group_offsets = false;
   double noise = 0.0;            ///< robust deviation of the rows beside a model that is flexible along each column
   Repeats repeats{};
+  std::optional<Overlap> overlap{};  ///< of series, where the reference begins anew in the file
   Model model{};
   bool is_written = true;        ///< false: the model is no better than none on locked rows
   Ladder seen{}, unseen{};       ///< of open rows, of locked rows: the written model's
