@@ -54,28 +54,13 @@ Curve lineOf(const Eigen::VectorXd& x, const Eigen::VectorXd& y, std::string nam
 
 Section ladderSection(const Discovery& d) {
   const Ladder& ladder = judgedOf(d);
-  const std::string& unit = d.readings.unit;
-  Section section{"ladder", "What is left, step by step",
-                  fmt::format("On {} {}: {} → {} (RMS).", counted(ladder.rows, "row"), d.unseen.rows > 0 ? "that nothing was fitted to" : "that it was fitted to",
-                              quantityText(ladder.first(), unit), quantityText(ladder.last(), unit)), Tone::Neutral, {}};
-  TableBlock table{fmt::format("{} The last step is the file that was written, read again and applied to these rows.", ladder.has_truth ? "Errors after each model." : "Scatter about the mean: the table has no reference."),
-                   {"model", labelled("RMS", unit), labelled("95 % within", unit), labelled("RMS of rows it was fitted to", unit)}, {}};
-  Curve steps{.name = "left (RMS)", .ink = Ink::Measured, .stroke = Stroke::Dots}, line = steps, noise{.name = "scatter of repeats or neighbours", .ink = Ink::Baseline, .stroke = Stroke::Dashed};
-  line.name.clear(), line.stroke = Stroke::Line;
-  for (std::size_t i = 0; i < ladder.steps.size(); ++i) {
-    const Step& step = ladder.steps[i];
-    table.rows.push_back({step.name, shownDigits(step.rms, 4), shownDigits(step.p95, 4), i < d.seen.steps.size() ? shownDigits(d.seen.steps[i].rms, 4) : "–"});
-    for (Curve* curve : {&steps, &line}) curve->x.push_back(static_cast<double>(i)), curve->y.push_back(step.rms);
-    noise.x.push_back(static_cast<double>(i)), noise.y.push_back(d.repeats.deviation > 0.0 ? d.repeats.deviation : d.noise);
-  }
-  if (d.repeats.deviation > 0.0) table.rows.push_back({fmt::format("noise of {} repeated rows", d.repeats.rows), shownDigits(d.repeats.deviation, 4), "", ""});
-  else table.rows.push_back({"scatter of neighbouring rows", shownDigits(d.noise, 4), "", ""});
-  section.blocks.push_back(std::move(table));
-  std::string names;
-  for (std::size_t i = 0; i < ladder.steps.size(); ++i) names += fmt::format("{}{} {}", i > 0 ? ", " : "", i, ladder.steps[i].name);
-  section.blocks.push_back(Figure{"Steps: " + names, toSvg(Plot{.title = "what is left after each step", .x_label = "step", .y_label = labelled("RMS", unit),
-                                                               .curves = {line, steps, noise}, .zero_line = true})});
-  return section;
+  const bool has_repeats = d.repeats.deviation > 0.0;
+  return loop::ladderSection(
+      {.verdict = fmt::format("On {} {}: {} → {} (RMS).", counted(ladder.rows, "row"), d.unseen.rows > 0 ? "that nothing was fitted to" : "that it was fitted to",
+                              quantityText(ladder.first(), d.readings.unit), quantityText(ladder.last(), d.readings.unit)),
+       .about = fmt::format("{} The last step is the file that was written, read again and applied to these rows.", ladder.has_truth ? "Errors after each model." : "Scatter about the mean: the table has no reference."),
+       .unit = d.readings.unit, .steps = ladder.steps, .fitted = d.seen.steps, .noise = has_repeats ? d.repeats.deviation : d.noise,
+       .noise_name = has_repeats ? fmt::format("noise of {} repeated rows", d.repeats.rows) : "scatter of neighbouring rows"});
 }
 
 Section referenceSection(const Discovery& d) {
@@ -123,14 +108,6 @@ Section listSection(std::string id, std::string title, std::string verdict, cons
 
 // ---- For programs --------------------------------------------------------------------------------------------------
 
-Json ladderJson(const Ladder& ladder) {
-  Json json = Json::object();
-  json.set("rows", ladder.rows).set("has_reference", ladder.has_truth);
-  Json steps = Json::array();
-  for (const Step& step : ladder.steps) steps.push(Json::object().set("name", step.name).set("rms", step.rms).set("p95", step.p95));
-  return json.set("steps", std::move(steps));
-}
-
 Json effectJson(const Discovery& d, const Effect& effect) {
   Json terms = Json::array(), others = Json::array();
   for (const terms::Term& term : termsOf(effect.shape, effect.coefficient, quantityOf(d.readings))) terms.push(terms::toText(term));
@@ -172,6 +149,39 @@ Json noReadingsJson(const Discovery& d) {
 }
 
 }  // namespace
+
+Section ladderSection(const ShownLadder& shown) {
+  Section section{"ladder", "What is left, step by step", shown.verdict, Tone::Neutral, {}};
+  TableBlock table{shown.about, {"model", labelled("RMS", shown.unit), labelled("95 % within", shown.unit)}, {}};
+  if (!shown.fitted.empty()) table.header.push_back(labelled("RMS where it was fitted", shown.unit));
+  const auto row = [&](std::string name, const std::string& rms, const std::string& p95, const std::string& fitted) {
+    table.rows.push_back({std::move(name), rms, p95});
+    if (!shown.fitted.empty()) table.rows.back().push_back(fitted);
+  };
+  Curve steps{.name = "left (RMS)", .ink = Ink::Measured, .stroke = Stroke::Dots}, line = steps, noise{.name = shown.noise_name, .ink = Ink::Baseline, .stroke = Stroke::Dashed};
+  line.name.clear(), line.stroke = Stroke::Line;
+  std::string names;
+  for (std::size_t i = 0; i < shown.steps.size(); ++i) {
+    const Step& step = shown.steps[i];
+    row(step.name, shownDigits(step.rms, 4), shownDigits(step.p95, 4), i < shown.fitted.size() ? shownDigits(shown.fitted[i].rms, 4) : "–");
+    for (Curve* curve : {&steps, &line}) curve->x.push_back(static_cast<double>(i)), curve->y.push_back(step.rms);
+    noise.x.push_back(static_cast<double>(i)), noise.y.push_back(shown.noise);
+    names += fmt::format("{}{} {}", i > 0 ? ", " : "", i, step.name);
+  }
+  row(shown.noise_name, shownDigits(shown.noise, 4), "", "");
+  section.blocks.push_back(std::move(table));
+  section.blocks.push_back(Figure{"Steps: " + names, toSvg(Plot{.title = "what is left after each step", .x_label = "step", .y_label = labelled("RMS", shown.unit),
+                                                               .curves = {line, steps, noise}, .zero_line = true})});
+  return section;
+}
+
+Json ladderJson(const Ladder& ladder) {
+  Json json = Json::object();
+  json.set("rows", ladder.rows).set("has_reference", ladder.has_truth);
+  Json steps = Json::array();
+  for (const Step& step : ladder.steps) steps.push(Json::object().set("name", step.name).set("rms", step.rms).set("p95", step.p95));
+  return json.set("steps", std::move(steps));
+}
 
 Json dataOf(const Discovery& d) {
   const Answer answer = answerOf(d);

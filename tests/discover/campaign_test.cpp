@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <fstream>
 #include <numbers>
+#include <sstream>
 #include <stdexcept>
 
 #include "calib/plan/opened.h"
@@ -41,7 +42,10 @@ TEST_F(Searched, AHiddenEffectOfTheCatalogueIsNamedFittedAndAdded) {
       effects, [](const auto& any) { return std::holds_alternative<sim::Vignetting>(any); });
   ASSERT_NE(added, effects.end());
   EXPECT_NEAR(std::get<sim::Vignetting>(*added).exponent, 0.4, 0.1);
-  EXPECT_TRUE(std::filesystem::exists(folder_ / "out" / "report.json"));
+  EXPECT_THAT(answer->ladder, testing::AllOf(HasSubstr("  raw "), HasSubstr("  constant "), HasSubstr("  effects ")));
+  std::stringstream report;
+  report << std::ifstream{folder_ / "out" / "report.json"}.rdbuf();
+  EXPECT_THAT(report.str(), testing::AllOf(HasSubstr("\"ladder\""), HasSubstr("\"name\": \"raw\"")));
   // Opened once, and no more.
   EXPECT_TRUE(std::filesystem::exists(folder_ / "run" / plan::openedFile(plan::OpenedOf::A)));
   EXPECT_THAT(errorOf(job()), HasSubstr("the locked captures of camera A were opened on 20"));
@@ -53,6 +57,7 @@ TEST_F(Searched, WhatRemainsOnLockedCapturesIsLess) {
   ASSERT_THAT(namesOf(finding), ElementsAre("clock_scale")) << verdictOf(finding);
   ASSERT_TRUE(finding.judgement);
   EXPECT_LT(finding.judgement->after.rms_mm, 0.8 * finding.judgement->before.rms_mm);
+  EXPECT_LT(finding.judgement->before.rms_mm, finding.judgement->raw.rms_mm) << "a clock that is fast by 0.3 % is mostly an offset";
   EXPECT_GT(finding.judgement->removed, 0.75);
   const auto& numbers = finding.effects.front().fitted->numbers;
   ASSERT_EQ(numbers.size(), 1u);

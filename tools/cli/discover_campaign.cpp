@@ -95,8 +95,10 @@ Result<Exit> discoverRun(const std::string& run, const std::string& output, cons
   compare::Progress progress{stderr};
   const auto answer = discover::discoverCampaign(*job, progress);
   if (!answer) return answer.error();
+  fmt::print("{}.\n", answer->verdict);
+  if (!answer->ladder.empty()) fmt::print("\nWhat is left on the locked captures, RMS:\n{}\n", answer->ladder);
   for (const std::string& note : answer->notes) fmt::print("note: {}\n", note);
-  fmt::print("{}.\n{}\n", answer->verdict, answer->page.string());
+  fmt::print("{}\n", answer->page.string());
   return Exit::Ok;
 }
 

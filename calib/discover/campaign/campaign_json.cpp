@@ -6,6 +6,7 @@
 #include <fmt/chrono.h>
 #include <fmt/format.h>
 
+#include "calib/discover/campaign/locked_section.h"
 #include "calib/discover/campaign/pose_errors.h"
 
 namespace toftwin::discover {
@@ -44,7 +45,7 @@ Json toJson(const JudgedRegion& region) {
 
 Json toJson(const Judgement& judged) {
   Json locked = Json::object();
-  locked.set("before", toJson(judged.before)).set("after", toJson(judged.after));
+  locked.set("raw", toJson(judged.raw)).set("before", toJson(judged.before)).set("after", toJson(judged.after));
   locked.set("with_zero", toJson(judged.with_zero)).set("removed_by_zero", judged.removed_by_zero);
   locked.set("removed", judged.removed).set("removed_low", judged.removed_low);
   locked.set("removed_high", judged.removed_high).set("explainable_chi2", judged.explainable);
@@ -136,6 +137,7 @@ Json jsonOf(const CampaignJob& job, const CampaignFinding& finding) {
     if (!finding.locked_off.empty()) locked.set("off_their_poses", toJson(finding.locked_off));
     if (finding.without_off) locked.set("without_these", toJson(*finding.without_off));
     data.set("locked_captures", std::move(locked));
+    data.set("ladder", loop::ladderJson(ladderOf(*judged, hasDelay(finding))));
   }
   data.set("notes", Json::arrayOf(finding.notes)).set("seconds", finding.seconds);
   return data.set("software", "toftwin " TOFTWIN_VERSION)

@@ -326,6 +326,7 @@ Result<std::filesystem::path> writeReport(const CampaignJob& job, const Campaign
                                 finding.locked, finding.locked == 1 ? "capture" : "captures", finding.plan);
   report.verdict = verdictOf(finding) + ".";
   report.cards = cardsOf(finding);
+  if (finding.judgement) report.sections.push_back(ladderSection(finding));
   report.sections.push_back(foundSection(finding));
   if (finding.judgement) report.sections.push_back(lockedSection(finding));
   report.colophon = fmt::format("toftwin {}, {}{}{}; {:.0f} s", TOFTWIN_VERSION, today(),

@@ -15,6 +15,7 @@
 #include "calib/discover/campaign/gather_capture.h"
 #include "calib/discover/campaign/light_noise.h"
 #include "calib/discover/campaign/locked_places.h"
+#include "calib/discover/campaign/locked_section.h"
 #include "calib/discover/campaign/model_file.h"
 #include "calib/discover/campaign/next_capture.h"
 #include "calib/discover/campaign/pool_noise.h"
@@ -379,7 +380,10 @@ Result<CampaignAnswer> discoverCampaign(const CampaignJob& job, compare::Progres
   if (!page) return page.error();
   if (auto written = compare::writeFile(job.output / "model.toml", finding->model_toml); !written) return written.error();
   progress.end();
-  return CampaignAnswer{*std::move(page), verdictOf(*finding), std::move(finding->notes)};
+  const auto& judged = finding->judgement;
+  return CampaignAnswer{.page = *std::move(page), .verdict = verdictOf(*finding),
+                        .ladder = judged ? loop::ladderText(ladderOf(*judged, hasDelay(*finding)), "mm") : "",
+                        .notes = std::move(finding->notes)};
 }
 
 }  // namespace toftwin::discover

@@ -121,6 +121,7 @@ Result<CampaignFinding> searchCampaign(const CampaignJob& job, compare::Progress
 struct CampaignAnswer {
   std::filesystem::path page{};
   std::string verdict{};
+  std::string ladder{};  ///< lines for a terminal; empty: nothing was judged
   std::vector<std::string> notes{};
 };
 /// The same, and leaves index.html, report.json, report.md and model.toml in the output folder.

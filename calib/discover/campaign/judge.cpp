@@ -124,7 +124,7 @@ Result<Judgement> judge(const JudgedCampaign& judged, const JudgedCampaign& open
       NoiselessCamera::make(judged.declared.model, after.effects, judged.lit.captures);
   if (!camera_after) return camera_after.error();
   Judgement judgement;
-  Totals all_before, all_with_zero, all_after;
+  Totals all_raw, all_before, all_with_zero, all_after;
   std::vector<JudgedPixel> pixels;
   Mean mean_before, mean_after;
   for (std::size_t c = 0; c < judged.lit.captures.size(); ++c) {
@@ -139,6 +139,7 @@ Result<Judgement> judge(const JudgedCampaign& judged, const JudgedCampaign& open
     };
     const Reading declared = readingBy(*camera_before);
     const Errors then = errorsOf(capture, traced, declared, before.offset_mm), now = errors(*camera_after, after.offset_mm);
+    all_raw.add(errorsOf(capture, traced, declared, 0.0));
     all_before.add(then), all_after.add(now);
     addPixels(capture, traced, declared, then, now, pixels);
     mean_before.add(then.each_mm), mean_after.add(now.each_mm);
@@ -148,7 +149,7 @@ Result<Judgement> judge(const JudgedCampaign& judged, const JudgedCampaign& open
                                   t.rms, capture.record.a.since_power_on_s,
                                   capture.record.distance_m});
   }
-  all_before.into(judgement.before), all_after.into(judgement.after);
+  all_raw.into(judgement.raw), all_before.into(judgement.before), all_after.into(judgement.after);
   all_with_zero.into(judgement.with_zero);
   judgement.regions = regionsOf(pixels);
   judgement.mean = {mean_before.take(), mean_after.take()};

@@ -43,7 +43,8 @@ struct JudgedModels {
 };
 
 struct Judgement {
-  RangeErrors before{}, with_zero{}, after{};
+  /// As declared without and with where zero lies: an offset, then the light's delay, too; and with all that was found.
+  RangeErrors raw{}, before{}, with_zero{}, after{};
   std::vector<JudgedCapture> captures{};
   std::vector<JudgedRegion> regions{};
   MeanErrors mean{};

@@ -116,6 +116,25 @@ std::string delayInWords(const CampaignFinding& finding) {
   return words;
 }
 
+loop::Ladder ladderOf(const Judgement& judgement, bool has_delay) {
+  const auto step = [](const char* name, const RangeErrors& errors) { return loop::Step{name, errors.rms_mm, errors.p95_mm}; };
+  loop::Ladder ladder{.rows = judgement.after.pixels};
+  ladder.steps = {step("raw", judgement.raw), step("constant", judgement.before)};
+  if (has_delay) ladder.steps.push_back(step("delay", judgement.with_zero));
+  ladder.steps.push_back(step("effects", judgement.after));
+  return ladder;
+}
+
+compare::Section ladderSection(const CampaignFinding& finding) {
+  const loop::Ladder ladder = ladderOf(*finding.judgement, hasDelay(finding));
+  const auto& regions = finding.judgement->regions;
+  return loop::ladderSection({.verdict = fmt::format("On {} pixels of locked captures: {} → {} mm (RMS).", ladder.rows, shown(ladder.first(), 2), shown(ladder.last(), 2)),
+                              .about = "Measured − simulated on the locked captures, edges left out. The last step is model.toml, read again. "
+                                       "Noise of the light, traced or of a simulated camera, is in what is left, too.",
+                              .unit = "mm", .steps = ladder.steps, .noise = regions.empty() ? 0.0 : regions.front().noise_mm,
+                              .noise_name = "noise of the means over frames"});
+}
+
 compare::Section lockedSection(const CampaignFinding& finding) {
   const Judgement& judgement = *finding.judgement;
   compare::Section section{.id = "locked", .title = "Before and after, on locked captures"};

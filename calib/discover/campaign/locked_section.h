@@ -5,6 +5,7 @@
 
 #include "calib/compare/report.h"
 #include "calib/discover/campaign/discover_campaign.h"
+#include "calib/loop/page.h"
 
 /// The page's part on locked captures.
 namespace toftwin::discover {
@@ -16,7 +17,10 @@ bool hasDelay(const CampaignFinding& finding);
 /// It, and what of the locked captures' error it is; empty: nothing.
 std::string delayInWords(const CampaignFinding& finding);
 
-/// They must have been judged.
+/// What is left of the range errors on the locked captures, step by step.
+loop::Ladder ladderOf(const Judgement& judgement, bool has_delay);
+/// The captures must have been judged.
+compare::Section ladderSection(const CampaignFinding& finding);
 compare::Section lockedSection(const CampaignFinding& finding);
 
 }  // namespace toftwin::discover
