@@ -55,4 +55,12 @@ std::optional<double> realIn(const std::string& text) {
   return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
+toftwin::o3d303::XmlRpcFault faultOf(const Error& error) {
+  using Code = Error::Code;
+  const int code = error.code == Code::InvalidArgument                               ? Fault::kOutOfRange
+                   : error.code == Code::NotFound || error.code == Code::Unsupported ? Fault::kReadOnly
+                                                                                     : Fault::kInternal;
+  return {code, error.message};
+}
+
 }  // namespace toftwin::daemon::o3d303

@@ -10,6 +10,8 @@
 namespace toftwin::daemon::o3d303 {
 
 toftwin::o3d303::XmlRpcAnswer fault(int code, std::string text);
+/// What a client is told of a source's refusal.
+toftwin::o3d303::XmlRpcFault faultOf(const Error& error);
 /// What the camera answers where there is nothing to say.
 toftwin::o3d303::XmlRpcAnswer nothing();
 toftwin::o3d303::XmlRpcAnswer noSuchMethod(const toftwin::o3d303::XmlRpcCall& call);

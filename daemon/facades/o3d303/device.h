@@ -19,6 +19,7 @@
 #include "daemon/facades/o3d303/binning.h"
 #include "daemon/facades/o3d303/clipping.h"
 #include "daemon/facades/o3d303/rules.h"
+#include "daemon/facades/source_changes.h"
 #include "drivers/o3d303/wire/extrinsics.h"
 #include "drivers/o3d303/wire/schema.h"
 #include "drivers/o3d303/wire/xmlrpc.h"
@@ -64,9 +65,6 @@ struct SourceFacts {
   /// This machine's clock, where its relation to that of the frames is known.
   std::optional<std::int64_t> host_ns;
 };
-
-/// What a client's wish makes of the source: its parameters' names and values.
-using SourceChanges = std::vector<std::pair<std::string, double>>;
 
 /// The camera's XML-RPC objects without a network or a source: parameters, applications, sessions, edit mode.
 class Device {

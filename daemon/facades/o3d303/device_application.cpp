@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "daemon/facades/o3d303/answers.h"
-#include "daemon/facades/o3d303/commands.h"
+#include "daemon/facades/o3d303/schemas.h"
 #include "daemon/facades/o3d303/device.h"
 
 namespace toftwin::daemon::o3d303 {

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "daemon/facades/frame_views.h"
-#include "daemon/facades/o3d303/inverse_lens.h"
+#include "daemon/facades/ifm/inverse_lens.h"
 #include "drivers/o3d303/wire/confidence.h"
 
 namespace toftwin::daemon::o3d303 {
@@ -77,7 +77,7 @@ LensChunks lensChunksOf(const CameraInfo& camera, const toftwin::o3d303::Extrins
     return chunk;
   };
   lens.intrinsics = chunkOf(camera.distortion);
-  lens.inverse_intrinsics = chunkOf(inverseDistortion(camera));
+  lens.inverse_intrinsics = chunkOf(ifm::inverseDistortion(camera));
   return lens;
 }
 

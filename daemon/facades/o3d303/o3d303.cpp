@@ -17,14 +17,16 @@
 #include "daemon/facades/listen_for.h"
 #include "daemon/facades/held_frames.h"
 #include "daemon/facades/o3d303/device.h"
-#include "daemon/facades/o3d303/discovery.h"
+#include "daemon/facades/ifm/discovery.h"
 #include "daemon/facades/o3d303/frame_maker.h"
 #include "daemon/facades/o3d303/frame_timing.h"
-#include "daemon/facades/o3d303/http_server.h"
+#include "daemon/facades/ifm/http_server.h"
 #include "daemon/facades/o3d303/images.h"
 #include "daemon/facades/o3d303/keys.h"
-#include "daemon/facades/o3d303/pcic_server.h"
-#include "daemon/facades/o3d303/source_changes.h"
+#include "daemon/facades/o3d303/schemas.h"
+#include "daemon/facades/ifm/pcic_server.h"
+#include "daemon/facades/o3d303/answers.h"
+#include "daemon/facades/source_changes.h"
 #include "daemon/facades/source_link.h"
 #include "drivers/logging.h"
 #include "protocol/settings/describe.h"
@@ -32,6 +34,10 @@
 namespace toftwin::daemon::o3d303 {
 namespace {
 
+using ifm::Discovery;
+using ifm::HttpServer;
+using ifm::PcicError;
+using ifm::PcicServer;
 using std::chrono::milliseconds;
 using std::chrono::steady_clock;
 using toftwin::o3d303::XmlRpcAnswer;
@@ -99,7 +105,9 @@ class O3d303Facade final : public Facade {
                       .ask = [this](std::string_view command) { return tellOfDevice(command); },
                       .connections = [this](std::size_t count) { noteConnections(count); },
                       .activate = [this](int index, auto done) { activate(index, std::move(done)); },
-                      .last_frame = [this] { return maker_.last(); },
+                      .last_frame = [this] { return lastFrame(); },
+                      .serves = isServed,
+                      .schema_of_image = schemaOfImage,
                       .lasting_error = [this] { return is_too_hot_ ? PcicError::kIlluminationTooHot : 0; }});
     if (keys_.discoverable) {
       auto discovery = Discovery::listen(thread_.io(), place_.keys.address,
@@ -169,7 +177,13 @@ class O3d303Facade final : public Facade {
     if (device_->isIdle()) return false;
     const auto wire = maker_.make(frame, *device_);
     if (!wire) return complainOnce(wire.error()), false;
-    return pcic_->publish(**wire, damage);
+    return pcic_->publish([&](const auto& schema) { return writeFrameContent(schema, **wire); }, damage);
+  }
+
+  ifm::FrameWriter lastFrame() {
+    const auto* frame = maker_.last();
+    if (frame == nullptr) return {};
+    return [frame](const auto& schema) { return writeFrameContent(schema, *frame); };
   }
 
   /// The source is set to the exposure that the frame asks for, if the application leaves it to the camera.

@@ -19,10 +19,12 @@ function(toftwin_fuzz_facade name)
   set_tests_properties(fuzz_${name}_facade PROPERTIES TIMEOUT 120)
 endfunction()
 
-set(o3d303 answers.cpp auto_exposure.cpp bindings.cpp clipping.cpp commands.cpp device.cpp device_application.cpp
-           device_edit.cpp device_frames.cpp device_source.cpp device_transfer.cpp discovery.cpp request_check.cpp rules.cpp)
+set(ifm commands.cpp discovery.cpp request_check.cpp)
+list(TRANSFORM ifm PREPEND ${facades}/ifm/)
+set(o3d303 answers.cpp auto_exposure.cpp bindings.cpp clipping.cpp device.cpp device_application.cpp device_edit.cpp
+           device_frames.cpp device_source.cpp device_transfer.cpp rules.cpp schemas.cpp)
 list(TRANSFORM o3d303 PREPEND ${facades}/o3d303/)
-toftwin_fuzz_facade(o3d303 ${o3d303} ${facades}/local_place.cpp)
+toftwin_fuzz_facade(o3d303 ${o3d303} ${ifm} ${facades}/local_place.cpp)
 toftwin_fuzz_facade(ros2 ${facades}/ros2/pose.cpp)
 toftwin_fuzz_facade(modbus ${facades}/modbus/identification.cpp ${facades}/modbus/registers.cpp ${facades}/modbus/requests.cpp)
 set(gige_vision bootstrap_registers.cpp device.cpp device_write.cpp features.cpp genicam_xml.cpp gvcp.cpp gvsp.cpp images.cpp memory.cpp)

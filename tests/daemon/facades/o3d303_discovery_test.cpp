@@ -9,7 +9,7 @@
 #include <array>
 #include <string>
 
-#include "daemon/facades/o3d303/discovery.h"
+#include "daemon/facades/ifm/discovery.h"
 #include "facade_testing.h"
 
 namespace toftwin::daemon {
@@ -36,7 +36,7 @@ std::string textAt(std::span<const std::byte> bytes, std::size_t at, std::size_t
 
 /// The fourteen numbers and texts, where the vendor's client looks for them.
 TEST(O3d303Discovery, AnAnswerSaysWhereTheCameraIs) {
-  const auto bytes = o3d303::encode({.address = {192, 168, 0, 69},
+  const auto bytes = ifm::encode({.address = {192, 168, 0, 69},
                                      .gateway = {192, 168, 0, 201},
                                      .netmask = {255, 255, 255, 0},
                                      .port = 8080,

@@ -6,10 +6,11 @@
 #include <cstdlib>
 #include <string_view>
 
-#include "daemon/facades/o3d303/commands.h"
+#include "daemon/facades/ifm/commands.h"
 #include "daemon/facades/o3d303/device.h"
-#include "daemon/facades/o3d303/discovery.h"
-#include "daemon/facades/o3d303/request_check.h"
+#include "daemon/facades/o3d303/schemas.h"
+#include "daemon/facades/ifm/discovery.h"
+#include "daemon/facades/ifm/request_check.h"
 #include "drivers/o3d303/wire/base64.h"
 #include "drivers/o3d303/wire/frame_writer.h"
 #include "drivers/o3d303/wire/pcic.h"
@@ -19,6 +20,7 @@
 namespace toftwin::daemon {
 namespace {
 
+using namespace ifm;
 using namespace o3d303;
 using toftwin::o3d303::XmlRpcCall;
 using toftwin::o3d303::XmlRpcValue;
@@ -170,7 +172,7 @@ void readMessages(std::span<const std::byte> bytes) {
   while (true) {
     const auto message = reader.next();
     if (!message || !*message) return;
-    const Command command = readCommand(toftwin::o3d303::textOf((*message)->content));
+    const Command command = readCommand(toftwin::o3d303::textOf((*message)->content), isServed);
     if (command.kind == Command::Kind::SetSchema) demand(isServed(command.schema));
     if (command.kind == Command::Kind::SetOutput) demand(command.output < 16);
     demand(command.number >= 0 && command.number < 100);
@@ -183,7 +185,7 @@ void readMessages(std::span<const std::byte> bytes) {
 void fuzzOneInput(std::span<const std::byte> bytes) {
   const std::string_view text = toftwin::o3d303::textOf(bytes);
   readMessages(bytes);
-  static_cast<void>(readCommand(text));
+  static_cast<void>(readCommand(text, isServed));
   static_cast<void>(readSearch(bytes));
   static_cast<void>(readExposureRegion(std::string{text}));
   const std::size_t cut = text.size() / 3;

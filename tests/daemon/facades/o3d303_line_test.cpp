@@ -14,7 +14,8 @@
 #include "o3d303_client.h"
 
 // Behind the client, whose o3d303 is the wire's.
-#include "daemon/facades/o3d303/pcic_server.h"
+#include "daemon/facades/ifm/pcic_server.h"
+#include "drivers/o3d303/wire/frame_writer.h"
 
 namespace toftwin::daemon {
 namespace {
@@ -95,7 +96,7 @@ TEST(PcicServer, ACutConnectionEndsThoughItsClientReadsNothing) {
   using boost::asio::ip::tcp;
   boost::asio::io_context io;
   std::size_t connections = 0;
-  o3d303::PcicServer server{
+  ifm::PcicServer server{
       tcp::acceptor{io, {boost::asio::ip::address_v4::loopback(), 0}},
       {.trigger = {},
        .default_schema = [] { return toftwin::o3d303::schemaOf({toftwin::o3d303::kDistanceBlob}); },
@@ -107,9 +108,10 @@ TEST(PcicServer, ACutConnectionEndsThoughItsClientReadsNothing) {
   toftwin::o3d303::CameraFrame frame;
   frame.width = frame.height = 1024;
   frame.distance_mm = pixels;
-  for (int i = 0; i < 1000 && server.publish(frame); ++i) io.poll();
-  EXPECT_FALSE(server.publish(frame)) << "2 MB each: it takes no more";
-  EXPECT_TRUE(server.publish(frame, {.noise = {}, .is_cut = true})) << "the half goes all the same";
+  const auto write = [&](const auto& schema) { return writeFrameContent(schema, frame); };
+  for (int i = 0; i < 1000 && server.publish(write); ++i) io.poll();
+  EXPECT_FALSE(server.publish(write)) << "2 MB each: it takes no more";
+  EXPECT_TRUE(server.publish(write, {.noise = {}, .is_cut = true})) << "the half goes all the same";
   reads_nothing.sendBytes(toftwin::o3d303::textOf(toftwin::o3d303::encodePcic("1000", "V?")));
   const auto soon = std::chrono::steady_clock::now() + kSoon;
   while (connections > 0 && std::chrono::steady_clock::now() < soon) io.run_one_for(1s);

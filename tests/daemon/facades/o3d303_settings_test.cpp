@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "daemon/facades/o3d303/request_check.h"
+#include "daemon/facades/ifm/request_check.h"
 #include "measured_intervals.h"
 #include "o3d303_configuration.h"
 
@@ -243,7 +243,7 @@ TEST_F(O3d303Configuration, ResolutionHalvesTheRowsAndColumnsOfAFineSource) {
 TEST(O3d303Requests, OfAWebPageAreRefused) {
   const std::vector<std::string> names{"camera.lan"};
   const auto status = [&](std::string_view host, std::string_view origin, std::string_view type) {
-    return refusalOf({host, origin, type}, names).status;
+    return ifm::refusalOf({host, origin, type}, names).status;
   };
   EXPECT_EQ(status("127.0.0.1", "", "text/xml"), 0);
   EXPECT_EQ(status("192.168.0.69:80", "", "text/xml; charset=utf-8"), 0);

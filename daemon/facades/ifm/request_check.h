@@ -5,7 +5,7 @@
 #include <string_view>
 #include <vector>
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 
 /// What a request says of where it comes from and what it brings.
 struct RequestHead {
@@ -22,4 +22,4 @@ struct Refused {
 };
 Refused refusalOf(const RequestHead& head, const std::vector<std::string>& own_names);
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

@@ -16,12 +16,13 @@
 
 #include <toftwin/result.h>
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 
 /// What the camera says of itself to the vendor's search.
 struct Announcement {
   std::array<std::uint8_t, 4> address{}, gateway{}, netmask{};
   std::uint16_t port = 80;
+  std::uint16_t device = 2;  ///< the second number of DeviceType: 2 of an O3D303
   std::array<std::uint8_t, 6> mac{};
   std::string host_name, device_name;
 };
@@ -57,4 +58,4 @@ class Discovery {
   const std::shared_ptr<bool> is_alive_ = std::make_shared<bool>(true);
 };
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

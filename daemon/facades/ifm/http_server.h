@@ -13,7 +13,7 @@
 
 #include "daemon/facades/accepting.h"
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 
 /// XML over HTTP: the camera's configuration port, for programs and not for web pages. A client that stalls
 /// is closed after half a minute and holds up nobody. Used on the facade's thread only.
@@ -44,4 +44,4 @@ class HttpServer {
   Accepting accepting_;
 };
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

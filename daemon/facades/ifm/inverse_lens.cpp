@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/o3d303/inverse_lens.h"
+#include "daemon/facades/ifm/inverse_lens.h"
 
 #include <algorithm>
 #include <cmath>
 #include <utility>
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 namespace {
 
 constexpr std::size_t kTerms = 5;
@@ -65,4 +65,4 @@ std::array<double, 5> inverseDistortion(const CameraInfo& camera) {
   return solve(equations);
 }
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/o3d303/http_server.h"
+#include "daemon/facades/ifm/http_server.h"
 
 #include <boost/asio/steady_timer.hpp>
 #include <boost/beast/core/flat_buffer.hpp>
@@ -11,9 +11,9 @@
 #include <optional>
 #include <string_view>
 
-#include "daemon/facades/o3d303/request_check.h"
+#include "daemon/facades/ifm/request_check.h"
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 namespace {
 
 namespace http = boost::beast::http;
@@ -128,4 +128,4 @@ void HttpServer::take(tcp::socket socket) {
   connection->read();
 }
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

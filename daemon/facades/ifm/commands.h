@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <functional>
 #include <string>
 #include <string_view>
 
 #include "drivers/o3d303/wire/schema.h"
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 
 /// What a connection wants to be sent without asking: the bits of the command "p".
 struct Output {
@@ -14,7 +15,7 @@ struct Output {
   static constexpr unsigned kAll = kResults | kErrors | kNotifications;
 };
 
-/// A PCIC command as the camera understands it. [ifm, operating instructions O3D303, process interface]
+/// A PCIC command as the maker's cameras understand it. [ifm, operating instructions O3D303, process interface]
 struct Command {
   enum class Kind {
     SetSchema,       ///< "c", nine digits, JSON
@@ -41,15 +42,13 @@ struct Command {
   int number = 0;  ///< of an image, an application, a version or a wire
   bool is_high = false;
 };
-/// Whether every frame can be written after that schema.
-bool isServed(const toftwin::o3d303::Schema& schema);
-/// What the command "I" asks for by that number, up to 9 and 11; empty: nothing has it.
-toftwin::o3d303::Schema schemaOfImage(int number);
+/// Whether every frame of a camera can be written after that schema.
+using ServesSchema = std::function<bool(const toftwin::o3d303::Schema&)>;
 /// The same without "star" and "stop": what is sent because it was asked for has neither.
 toftwin::o3d303::Schema withoutMarkers(toftwin::o3d303::Schema schema);
-/// Any bytes are safe.
-Command readCommand(std::string_view content);
+/// Any bytes are safe. A schema that is not served is Refused.
+Command readCommand(std::string_view content, const ServesSchema& serves);
 /// What the command "H?" answers.
 std::string_view listOfCommands();
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/o3d303/request_check.h"
+#include "daemon/facades/ifm/request_check.h"
 
 #include <utility>  // before asio: Boost 1.74 uses std::exchange without it
 
@@ -10,7 +10,7 @@
 
 #include <algorithm>
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 namespace {
 
 constexpr int kForbidden = 403, kUnsupportedMedia = 415;
@@ -55,4 +55,4 @@ Refused refusalOf(const RequestHead& head, const std::vector<std::string>& own_n
   return {};
 }
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

@@ -1,18 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/o3d303/source_changes.h"
+#include "daemon/facades/source_changes.h"
 
 #include <algorithm>
 #include <utility>
 
-namespace toftwin::daemon::o3d303 {
-
-toftwin::o3d303::XmlRpcFault faultOf(const Error& error) {
-  using Code = Error::Code;
-  const int code = error.code == Code::InvalidArgument                               ? Fault::kOutOfRange
-                   : error.code == Code::NotFound || error.code == Code::Unsupported ? Fault::kReadOnly
-                                                                                     : Fault::kInternal;
-  return {code, error.message};
-}
+namespace toftwin::daemon {
 
 Result<> setAll(drivers::Source& source, SourceChanges changes) {
   const auto before = source.state().parameters;
@@ -42,4 +34,4 @@ Result<> setAll(drivers::Source& source, SourceChanges changes) {
   return {};
 }
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "daemon/facades/o3d303/pcic_server.h"
+#include <utility>  // before asio: Boost 1.74 uses std::exchange without it
 
+#include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <boost/asio/write.hpp>
 
@@ -11,14 +12,19 @@
 #include <array>
 #include <chrono>
 #include <deque>
+#include <memory>
 #include <optional>
+#include <span>
+#include <string>
+#include <string_view>
 
-#include "daemon/facades/o3d303/commands.h"
+#include "daemon/facades/ifm/pcic_shared.h"
+#include "drivers/o3d303/wire/pcic.h"
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 
 /// One client of the port: what it wants, and what waits for it.
-class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
+class PcicConnection : public std::enable_shared_from_this<PcicConnection> {
   using tcp = boost::asio::ip::tcp;
   using error_code = boost::system::error_code;
   using Bytes = toftwin::o3d303::Bytes;
@@ -28,9 +34,9 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
   /// Shared by the connections that send them.
   using SharedBytes = std::shared_ptr<const Bytes>;
 
-  Connection(PcicServer& server, tcp::socket socket, int number)
-      : server_(server),
-        alive_(server.is_alive_),
+  PcicConnection(PcicShared& shared, tcp::socket socket, int number)
+      : shared_(shared),
+        alive_(shared.is_alive),
         number_(number),
         socket_(std::move(socket)),
         ends_(socket_.get_executor()),
@@ -44,16 +50,16 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
     if ((output_ & Output::kResults) == 0) return std::nullopt;
     return schema();
   }
-  [[nodiscard]] Schema schema() const { return schema_ ? *schema_ : server_.hooks_.default_schema(); }
+  [[nodiscard]] Schema schema() const { return schema_ ? *schema_ : shared_.hooks.default_schema(); }
   [[nodiscard]] bool takes(unsigned output) const { return (output_ & output) != 0; }
   [[nodiscard]] int number() const { return number_; }
   [[nodiscard]] toftwin::o3d303::PcicVersion version() const { return version_; }
   /// Whether the frame was waited for, and is the answer.
-  bool answerWith(const toftwin::o3d303::CameraFrame& frame) {
+  bool answerWith(const FrameWriter& frame) {
     if (!waiting_ticket_) return false;
     const std::string ticket = *std::exchange(waiting_ticket_, std::nullopt);
     waits_.cancel();
-    const auto content = writeFrameContent(withoutMarkers(schema()), frame);
+    const auto content = frame(withoutMarkers(schema()));
     content ? replyWith(ticket, *content) : reply(ticket, toftwin::o3d303::kRefused);
     return true;
   }
@@ -96,7 +102,7 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
     waits_.cancel();
     error_code ignored;
     socket_.close(ignored);
-    if (*alive_) server_.remove(shared_from_this());
+    if (*alive_) shared_.remove(shared_from_this());
   }
 
  private:
@@ -152,7 +158,7 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
                              });
   }
 
-  PcicServer& server_;
+  PcicShared& shared_;
   const std::shared_ptr<bool> alive_;
   const int number_;
   toftwin::o3d303::PcicVersion version_ = toftwin::o3d303::PcicVersion::V3;
@@ -169,4 +175,4 @@ class PcicServer::Connection : public std::enable_shared_from_this<Connection> {
   bool is_ending_ = false;  ///< takes no more, and obeys no more
 };
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/o3d303/discovery.h"
+#include "daemon/facades/ifm/discovery.h"
 
 #include <fmt/format.h>
 #include <sys/socket.h>
@@ -9,7 +9,7 @@
 
 #include "daemon/facades/local_place.h"
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 namespace {
 
 using boost::asio::ip::udp;
@@ -18,7 +18,6 @@ using boost::system::error_code;
 constexpr std::uint32_t kSearchMagic = 0x1020'EFCF, kReplyMagic = 0x1911'1981;
 constexpr std::size_t kSearchSize = 8, kHostName = 64, kDeviceName = 256;
 constexpr std::uint16_t kVendor = 310;  // ifm's number at IO-Link; clients do not look at it
-constexpr std::uint16_t kDevice = 2;    // of DeviceType "1:2"
 
 void appendBig(std::vector<std::byte>& bytes, std::uint64_t number, int count) {
   for (int shift = 8 * (count - 1); shift >= 0; shift -= 8)
@@ -48,7 +47,7 @@ std::vector<std::byte> encode(const Announcement& a) {
   for (const auto& part : {a.address, a.gateway, a.netmask}) {
     for (const std::uint8_t byte : part) bytes.push_back(std::byte{byte});
   }
-  for (const std::uint16_t number : {a.port, kVendor, kDevice, std::uint16_t{0}}) appendBig(bytes, number, 2);
+  for (const std::uint16_t number : {a.port, kVendor, a.device, std::uint16_t{0}}) appendBig(bytes, number, 2);
   appendBig(bytes, 0, 8);  // reserved
   for (const std::uint8_t byte : a.mac) bytes.push_back(std::byte{byte});
   appendBig(bytes, 0, 2);  // flags: in the right subnet, no DHCP, not temporary
@@ -117,4 +116,4 @@ void Discovery::receive(const std::shared_ptr<Ear>& ear) {
                                  });
 }
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/o3d303/pcic_server.h"
+#include "daemon/facades/ifm/pcic_server.h"
 
 #include <fmt/format.h>
 
@@ -7,9 +7,9 @@
 #include <optional>
 #include <vector>
 
-#include "daemon/facades/o3d303/pcic_connection.h"
+#include "daemon/facades/ifm/pcic_connection.h"
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 namespace {
 
 using boost::asio::ip::tcp;
@@ -18,16 +18,19 @@ using toftwin::o3d303::Bytes;
 using toftwin::o3d303::Schema;
 
 constexpr std::size_t kMostPcicConnections = 16;
+constexpr std::string_view kAlgorithmTicket = "0020";
 std::string errorText(int code) { return fmt::format("{:09}", code); }
 
 }  // namespace
 
 PcicServer::PcicServer(Listening listening, Hooks hooks)
-    : hooks_(std::move(hooks)),
+    : shared_{.hooks = std::move(hooks),
+              .remove = [this](const auto& connection) { remove(connection); },
+              .tell_error = [this](int code) { tellError(code); }},
       accepting_(std::move(listening), [this](tcp::socket socket) { take(std::move(socket)); }) {}
 
 PcicServer::~PcicServer() {
-  *is_alive_ = false;
+  *shared_.is_alive = false;
   for (const auto& connection : connections_) connection->close();
 }
 
@@ -40,11 +43,11 @@ void PcicServer::setOpen(bool is_open) {
 
 void PcicServer::take(tcp::socket socket) {
   if (connections_.size() >= kMostPcicConnections) return tellError(PcicError::kTooManyConnections);
-  auto connection = std::make_shared<Connection>(*this, std::move(socket), freeNumber());
+  auto connection = std::make_shared<PcicConnection>(shared_, std::move(socket), freeNumber());
   connections_.push_back(connection);
-  hooks_.connections(connections_.size());
+  shared_.hooks.connections(connections_.size());
   connection->read();
-  if (const int error = hooks_.lasting_error(); error != 0) connection->tellError(error);
+  if (const int error = shared_.hooks.lasting_error(); error != 0) connection->tellError(error);
 }
 
 /// The least that no connection has.
@@ -55,17 +58,17 @@ int PcicServer::freeNumber() const {
   return number;
 }
 
-void PcicServer::remove(const std::shared_ptr<Connection>& connection) {
+void PcicServer::remove(const std::shared_ptr<PcicConnection>& connection) {
   const std::size_t before = connections_.size();
   connections_.remove(connection);
-  if (connections_.size() != before) hooks_.connections(connections_.size());
+  if (connections_.size() != before) shared_.hooks.connections(connections_.size());
 }
 
-bool PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage& damage) {
+bool PcicServer::publish(const FrameWriter& frame, const Damage& damage) {
   struct Made {
     Schema schema;
     toftwin::o3d303::PcicVersion version;
-    Connection::SharedBytes bytes;
+    PcicConnection::SharedBytes bytes;
   };
   std::vector<Made> made;
   const auto all = connections_;  // sending may close one
@@ -81,7 +84,7 @@ bool PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage
     auto found = std::ranges::find_if(
         made, [&](const Made& one) { return one.schema == *schema && one.version == version; });
     if (found == made.end()) {
-      const auto content = writeFrameContent(*schema, frame);
+      const auto content = frame(*schema);
       if (!content) continue;  // no schema comes here that was not checked
       const std::span<const std::byte> bytes{*content};
       Bytes message = toftwin::o3d303::encodePcic(toftwin::o3d303::kFrameTicket, bytes, version);
@@ -96,12 +99,16 @@ bool PcicServer::publish(const toftwin::o3d303::CameraFrame& frame, const Damage
 }
 
 void PcicServer::tellError(int code) {
-  last_error_ = code;
+  shared_.last_error = code;
   tell(toftwin::o3d303::kErrorTicket, Output::kErrors, errorText(code));
 }
 
 void PcicServer::tellNotification(int code, std::string_view json) {
   tell(toftwin::o3d303::kNotificationTicket, Output::kNotifications, fmt::format("{:09}:{}", code, json));
+}
+
+void PcicServer::tellAlgorithm(std::string_view content) {
+  tell(kAlgorithmTicket, Output::kAlgorithm, content);
 }
 
 void PcicServer::tell(std::string_view ticket, unsigned output, std::string_view text) {
@@ -114,4 +121,4 @@ void PcicServer::tell(std::string_view ticket, unsigned output, std::string_view
   }
 }
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

@@ -1,10 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a client's commands do.
-#include "daemon/facades/o3d303/pcic_connection.h"
+#include "daemon/facades/ifm/pcic_connection.h"
 
 #include <utility>
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 namespace {
 
 using boost::system::error_code;
@@ -16,8 +16,8 @@ constexpr std::chrono::seconds kFramePatience{10};  ///< with a frame that was t
 
 }  // namespace
 
-void PcicServer::Connection::obey(const toftwin::o3d303::PcicMessage& message) {
-  const Command command = readCommand(toftwin::o3d303::textOf(message.content));
+void PcicConnection::obey(const toftwin::o3d303::PcicMessage& message) {
+  const Command command = readCommand(toftwin::o3d303::textOf(message.content), shared_.hooks.serves);
   switch (command.kind) {
     case Command::Kind::SetSchema:
       schema_ = command.schema;
@@ -27,7 +27,7 @@ void PcicServer::Connection::obey(const toftwin::o3d303::PcicMessage& message) {
       output_ = command.output;
       return reply(message.ticket, toftwin::o3d303::kDone);
     case Command::Kind::AskSchema: {
-      const std::string json = schema_ ? schema_text_ : server_.hooks_.default_schema_text();
+      const std::string json = schema_ ? schema_text_ : shared_.hooks.default_schema_text();
       return reply(message.ticket, fmt::format("{:09}{}", json.size(), json));
     }
     case Command::Kind::Trigger:
@@ -35,7 +35,7 @@ void PcicServer::Connection::obey(const toftwin::o3d303::PcicMessage& message) {
     case Command::Kind::TriggerAndWait:
       return triggerAndWait(message.ticket);
     case Command::Kind::AskError:
-      return reply(message.ticket, fmt::format("{:09}", server_.last_error_));
+      return reply(message.ticket, fmt::format("{:09}", shared_.last_error));
     case Command::Kind::AskImage:
       return replyImage(message.ticket, command.number);
     case Command::Kind::AskConnection:
@@ -57,18 +57,18 @@ void PcicServer::Connection::obey(const toftwin::o3d303::PcicMessage& message) {
     case Command::Kind::Other:
       break;
   }
-  const std::string answer = server_.hooks_.ask(toftwin::o3d303::textOf(message.content));
+  const std::string answer = shared_.hooks.ask(toftwin::o3d303::textOf(message.content));
   answer.empty() ? reply(message.ticket, toftwin::o3d303::kUnknown) : reply(message.ticket, answer);
 }
 
-void PcicServer::Connection::trigger(const std::string& ticket) {
-  server_.hooks_.trigger([self = shared_from_this(), ticket](int error) {
+void PcicConnection::trigger(const std::string& ticket) {
+  shared_.hooks.trigger([self = shared_from_this(), ticket](int error) {
     self->reply(ticket, error == 0 ? toftwin::o3d303::kDone : toftwin::o3d303::kRefused);
-    if (error != 0 && *self->alive_) self->server_.tellError(error);
+    if (error != 0 && *self->alive_) self->shared_.tell_error(error);
   });
 }
 
-void PcicServer::Connection::triggerAndWait(const std::string& ticket) {
+void PcicConnection::triggerAndWait(const std::string& ticket) {
   if (waiting_ticket_) return reply(ticket, toftwin::o3d303::kRefused);
   waiting_ticket_ = ticket;
   waits_.expires_after(kFramePatience);
@@ -76,24 +76,25 @@ void PcicServer::Connection::triggerAndWait(const std::string& ticket) {
     const auto self = weak.lock();
     if (!cancelled && self) self->stopWaiting();
   });
-  server_.hooks_.trigger([self = shared_from_this()](int error) {
+  shared_.hooks.trigger([self = shared_from_this()](int error) {
     if (error == 0) return;
     self->stopWaiting();
-    if (*self->alive_) self->server_.tellError(error);
+    if (*self->alive_) self->shared_.tell_error(error);
   });
 }
 
-void PcicServer::Connection::stopWaiting() {
+void PcicConnection::stopWaiting() {
   waits_.cancel();
   if (waiting_ticket_) reply(*std::exchange(waiting_ticket_, std::nullopt), toftwin::o3d303::kRefused);
 }
 
-void PcicServer::Connection::replyImage(const std::string& ticket, int number) {
+void PcicConnection::replyImage(const std::string& ticket, int number) {
   constexpr int kLastResult = 10;
-  const auto* frame = server_.hooks_.last_frame();
-  const Schema wanted = number == kLastResult ? withoutMarkers(schema()) : schemaOfImage(number);
-  if (frame == nullptr || wanted.empty()) return reply(ticket, toftwin::o3d303::kRefused);
-  const auto content = writeFrameContent(wanted, *frame);
+  const auto frame = shared_.hooks.last_frame();
+  const Schema wanted =
+      number == kLastResult ? withoutMarkers(schema()) : shared_.hooks.schema_of_image(number);
+  if (!frame || wanted.empty()) return reply(ticket, toftwin::o3d303::kRefused);
+  const auto content = frame(wanted);
   if (!content) return reply(ticket, toftwin::o3d303::kRefused);
   Bytes answer;
   toftwin::o3d303::appendText(answer, fmt::format("{:09}", content->size()));
@@ -101,15 +102,15 @@ void PcicServer::Connection::replyImage(const std::string& ticket, int number) {
   replyWith(ticket, answer);
 }
 
-void PcicServer::Connection::activate(const std::string& ticket, int index) {
-  server_.hooks_.activate(index, [self = shared_from_this(), ticket](bool is_done) {
+void PcicConnection::activate(const std::string& ticket, int index) {
+  shared_.hooks.activate(index, [self = shared_from_this(), ticket](bool is_done) {
     self->reply(ticket, is_done ? toftwin::o3d303::kDone : toftwin::o3d303::kRefused);
   });
 }
 
-void PcicServer::Connection::wire(const std::string& ticket, const Command& command) {
-  if (command.number < 1 || command.number > kWires) return reply(ticket, toftwin::o3d303::kRefused);
-  bool& is_high = server_.wires_[static_cast<std::size_t>(command.number) - 1];
+void PcicConnection::wire(const std::string& ticket, const Command& command) {
+  if (command.number < 1 || command.number > PcicShared::kWires) return reply(ticket, toftwin::o3d303::kRefused);
+  bool& is_high = shared_.wires[static_cast<std::size_t>(command.number) - 1];
   if (command.kind == Command::Kind::AskWire)
     return reply(ticket, fmt::format("{:02}{}", command.number, is_high ? 1 : 0));
   is_high = command.is_high;
@@ -117,11 +118,11 @@ void PcicServer::Connection::wire(const std::string& ticket, const Command& comm
 }
 
 /// The answer is of the version in which it was asked.
-void PcicServer::Connection::setVersion(const std::string& ticket, int version) {
+void PcicConnection::setVersion(const std::string& ticket, int version) {
   if (version < kOldest || version > kNewest) return reply(ticket, toftwin::o3d303::kRefused);
   reply(ticket, toftwin::o3d303::kDone);
   version_ = static_cast<toftwin::o3d303::PcicVersion>(version);
   reader_.setVersion(version_);
 }
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm

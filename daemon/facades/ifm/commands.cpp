@@ -1,18 +1,17 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "daemon/facades/o3d303/commands.h"
+#include "daemon/facades/ifm/commands.h"
 
 #include <algorithm>
 #include <array>
 #include <charconv>
 #include <optional>
 #include <utility>
-#include <vector>
 
 #include "drivers/o3d303/wire/frame_content.h"
 #include "drivers/o3d303/wire/frame_writer.h"
 #include "drivers/o3d303/wire/pcic.h"
 
-namespace toftwin::daemon::o3d303 {
+namespace toftwin::daemon::ifm {
 namespace {
 
 using toftwin::o3d303::Schema;
@@ -20,11 +19,11 @@ using toftwin::o3d303::SchemaElement;
 
 constexpr std::size_t kMostElements = 64;
 
-Command schemaCommand(std::string_view content) {
+Command schemaCommand(std::string_view content, const ServesSchema& serves) {
   const auto json = toftwin::o3d303::schemaInCommand(content);
   if (!json) return {.kind = Command::Kind::Refused};
   auto schema = toftwin::o3d303::readSchema(*json);
-  if (!schema || !isServed(*schema)) return {.kind = Command::Kind::Refused};
+  if (!schema || schema->size() > kMostElements || !serves(*schema)) return {.kind = Command::Kind::Refused};
   return {.kind = Command::Kind::SetSchema, .schema = *std::move(schema), .schema_text = std::string{*json}};
 }
 
@@ -67,27 +66,6 @@ Command numberedCommand(const Numbered& form, std::string_view content) {
 
 }  // namespace
 
-/// An empty frame tells.
-bool isServed(const Schema& schema) {
-  toftwin::o3d303::CameraFrame none;
-  none.width = none.height = 0;
-  return schema.size() <= kMostElements && writeFrameContent(schema, none).ok();
-}
-
-Schema schemaOfImage(int number) {
-  using namespace toftwin::o3d303;
-  using Blobs = std::vector<std::string_view>;
-  constexpr int kAllPoints = 11;
-  constexpr std::array kOne{kRawAmplitudeBlob, kAmplitudeBlob,  kDistanceBlob,   kXBlob, kYBlob, kZBlob,
-                            kConfidenceBlob,   kExtrinsicsBlob, kUnitVectorsBlob};
-  Blobs blobs;
-  if (number >= 1 && number <= std::ssize(kOne)) blobs = {kOne[static_cast<std::size_t>(number) - 1]};
-  if (number == kAllPoints) blobs = {kXBlob, kYBlob, kZBlob};
-  Schema schema;
-  for (const std::string_view blob : blobs) schema.push_back(SchemaElement::blob(blob));
-  return schema;
-}
-
 Schema withoutMarkers(Schema schema) {
   const auto isText = [](const SchemaElement& element, std::string_view text) {
     return element.kind == SchemaElement::Kind::Text && element.value == text;
@@ -97,7 +75,7 @@ Schema withoutMarkers(Schema schema) {
   return schema;
 }
 
-Command readCommand(std::string_view content) {
+Command readCommand(std::string_view content, const ServesSchema& serves) {
   using enum Command::Kind;
   constexpr std::array<std::pair<std::string_view, Command::Kind>, 7> kWords{{{"C?", AskSchema},
                                                                               {"V?", AskVersion},
@@ -109,7 +87,7 @@ Command readCommand(std::string_view content) {
   for (const auto& [word, kind] : kWords) {
     if (content == word) return {.kind = kind};
   }
-  if (content.starts_with('c')) return schemaCommand(content);
+  if (content.starts_with('c')) return schemaCommand(content, serves);
   if (content.starts_with('p')) return outputCommand(content);
   for (const Numbered& form : kNumbered) {
     if (content.starts_with(form.letter)) return numberedCommand(form, content);
@@ -137,4 +115,4 @@ std::string_view listOfCommands() {
          "L? - number of this connection\n";
 }
 
-}  // namespace toftwin::daemon::o3d303
+}  // namespace toftwin::daemon::ifm
