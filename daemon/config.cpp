@@ -183,6 +183,13 @@ FacadeKeys readFacadeKeys(settings::Table& table, const std::set<std::string>& s
   return keys;
 }
 
+void checkMoreSources(settings::Table& table, const FacadeKind::MoreSources& more, const std::set<std::string>& sources) {
+  for (const std::string& name : more.names) {
+    if (!sources.contains(name))
+      table.complain(more.key, fmt::format("names \"{}\", which is not the name of a [[source]] of this file", name));
+  }
+}
+
 ConfiguredFacade readFacade(settings::Table& table, std::span<const FacadeKind> facades,
                             const std::set<std::string>& sources) {
   FacadeKeys keys = readFacadeKeys(table, sources);
@@ -192,6 +199,7 @@ ConfiguredFacade readFacade(settings::Table& table, std::span<const FacadeKind> 
   ConfiguredFacade facade{std::move(keys), std::move(unevenness), std::move(fingerprint), {}};
   if (kind != facades.end() && kind->not_built.empty()) {
     facade.start = kind->read(table);
+    if (kind->more_sources != nullptr) checkMoreSources(table, kind->more_sources(table.anew()), sources);
     return facade;
   }
   if (kind != facades.end()) {

@@ -3,6 +3,7 @@
 
 #include <utility>  // before asio: Boost 1.74 uses std::exchange without it
 
+#include <boost/asio/ip/address.hpp>
 #include <boost/asio/ip/network_v4.hpp>
 #include <boost/asio/ip/network_v6.hpp>
 

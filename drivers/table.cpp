@@ -5,12 +5,14 @@
 #include "drivers/kinect2/kinect2.h"
 #include "drivers/not_built.h"
 #include "drivers/o3d303/o3d303.h"
+#include "drivers/o3r/o3r.h"
 #include "drivers/openni2/openni2.h"
 #include "drivers/pattern/pattern.h"
 #include "drivers/replay/replay.h"
 #include "drivers/sim/simulator.h"
 #include "drivers/source.h"
 #include "drivers/v4l2/v4l2.h"
+#include "drivers/visionary/visionary.h"
 
 namespace toftwin::drivers {
 
@@ -21,6 +23,8 @@ std::span<const Driver> allDrivers() {
       replay::row(),
       simulator::row(),
       o3d303::row(),
+      o3r::row(),
+      visionary::row(),
 #ifdef TOFTWIN_HAS_V4L2
       v4l2::row(),
 #else

@@ -91,6 +91,12 @@ struct FacadeKind {
   std::string (*document)();
   /// Empty, or why this build lacks it and what to do.
   std::string_view not_built = {};
+  /// Of one that shows several: the sources that its keys name beside `source`, and the key that names them.
+  struct MoreSources {
+    const char* key;
+    std::vector<std::string> names;
+  };
+  MoreSources (*more_sources)(settings::Table keys) = nullptr;
 };
 
 /// All facades, in the order of the documents.

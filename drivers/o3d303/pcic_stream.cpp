@@ -21,19 +21,19 @@ bool isAnswer(const PcicStream::Message& one) { return one.message.ticket >= "10
 }  // namespace
 
 Error PcicStream::lost(std::string_view what) const {
-  return {Error::Code::Disconnected, fmt::format("o3d303: {}: {}", name_, what)};
+  return {Error::Code::Disconnected, fmt::format("{}: {}: {}", driver_, name_, what)};
 }
 
 Result<> PcicStream::open(const Endpoint& camera, const toftwin::o3d303::Schema& schema) {
   close();
   name_ = fmt::format("{}:{}", camera.address().to_string(), camera.port());
-  if (auto connected = connect(loop_, socket_, camera); !connected) return connected;
+  if (auto connected = connect(loop_, socket_, camera, {}, driver_); !connected) return connected;
   const auto answer = command(toftwin::o3d303::schemaCommand(toJson(schema)));
   if (!answer) return answer.error();
   if (*answer == toftwin::o3d303::kDone) return {};
   close();
   return Error{Error::Code::Incompatible,
-               fmt::format("o3d303: {}: the camera's firmware does not know our schema", name_)};
+               fmt::format("{}: {}: the camera's firmware does not know our schema", driver_, name_)};
 }
 
 void PcicStream::close() {

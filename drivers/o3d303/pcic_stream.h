@@ -26,7 +26,9 @@ class PcicStream {
     SteadyTime arrived;  ///< when its first bytes were read
   };
 
-  explicit PcicStream(EventLoop& loop) : loop_(loop), socket_(loop.io()) {}
+  /// `driver` names it in errors; it must outlast this.
+  explicit PcicStream(EventLoop& loop, std::string_view driver = "o3d303")
+      : loop_(loop), driver_(driver), socket_(loop.io()) {}
   ~PcicStream() { close(); }
   PcicStream(const PcicStream&) = delete;
   PcicStream& operator=(const PcicStream&) = delete;
@@ -48,6 +50,7 @@ class PcicStream {
   [[nodiscard]] Error lost(std::string_view what) const;
 
   EventLoop& loop_;
+  std::string_view driver_;
   boost::asio::ip::tcp::socket socket_;
   std::string name_;
   toftwin::o3d303::PcicReader reader_{kLongestMessage};

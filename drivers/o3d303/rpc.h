@@ -28,14 +28,16 @@ inline constexpr std::chrono::milliseconds kFirstAnswerTime{400};
 
 /// Connects within kConnectTime. Error Disconnected, with the address and what to do.
 Result<> connect(EventLoop& loop, boost::asio::ip::tcp::socket& socket, const Endpoint& to,
-                 const std::stop_token& stop = {});
+                 const std::stop_token& stop = {}, std::string_view driver = "o3d303");
 
 /// Calls the camera's XML-RPC objects, each call over a connection of its own.
 class Rpc {
  public:
   static constexpr std::string_view kMain = "/api/rpc/v1/com.ifm.efector/";
 
-  Rpc(EventLoop& loop, Endpoint camera) : loop_(loop), camera_(std::move(camera)) {}
+  /// `driver` names it in errors; it must outlast this.
+  Rpc(EventLoop& loop, Endpoint camera, std::string_view driver = "o3d303")
+      : loop_(loop), camera_(std::move(camera)), driver_(driver) {}
 
   /// Errors: Disconnected if the camera cannot be reached or does not answer; what the camera
   /// refuses is Busy (somebody else configures it), PermissionDenied or InvalidArgument. `object`
@@ -52,6 +54,7 @@ class Rpc {
 
   EventLoop& loop_;
   Endpoint camera_;
+  std::string_view driver_;
 };
 
 }  // namespace toftwin::drivers::o3d303

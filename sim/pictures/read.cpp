@@ -1,17 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "sim/pictures/read.h"
 
-#include <dlfcn.h>
 #include <fmt/format.h>
 
 #include <fstream>
-#include <functional>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <type_traits>
 #include <vector>
 
+#include "sim/pictures/library.h"
 #include "sim/pictures/size.h"
 
 namespace toftwin::pictures {
@@ -24,27 +23,6 @@ using Imdecode = cv::Mat(cv::InputArray bytes, int flags);
 constexpr const char* kImread = "_ZN2cv6imreadERKNSt7__cxx1112basic_stringIcSt11char_traitsIcESaIcEEEi";
 constexpr const char* kImdecode = "_ZN2cv8imdecodeERKNS_11_InputArrayEi";
 static_assert(std::is_same_v<Imread, decltype(cv::imread)>);
-
-/// A function of OpenCV's library for picture files. It brings GDAL and a hundred more, whose loading takes 60 ms:
-/// each program that links it would begin with that, and few ever read a picture. So it is opened by the first
-/// that does, and stays open.
-template <class Function>
-Result<std::function<Function>> functionNamed(const char* name) {
-  static const std::string library =
-      fmt::format("libopencv_imgcodecs.so.{}{:02}", CV_VERSION_MAJOR, CV_VERSION_MINOR);
-  static void* const opened = ::dlopen(library.c_str(), RTLD_LAZY | RTLD_LOCAL);
-  if (opened == nullptr) {
-    return Error{Error::Code::Unsupported,
-                 fmt::format("{}, which reads picture files, cannot be opened; is OpenCV {}.{} installed?",
-                             library, CV_VERSION_MAJOR, CV_VERSION_MINOR)};
-  }
-  void* const symbol = ::dlsym(opened, name);
-  if (symbol == nullptr) {
-    return Error{Error::Code::Unsupported,
-                 fmt::format("{} has other functions than the OpenCV that this program was built with", library)};
-  }
-  return std::function<Function>{reinterpret_cast<Function*>(symbol)};
-}
 
 /// Whether it is a picture of a known format; an error if it is one, but too large.
 Result<bool> isWithinBound(std::span<const std::byte> bytes, const std::string& name) {

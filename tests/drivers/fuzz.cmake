@@ -40,3 +40,18 @@ add_test(NAME fuzz_aravis
          COMMAND fuzz_aravis -max_total_time=3 -max_len=512 -print_final_stats=1
                  ${CMAKE_BINARY_DIR}/fuzz_aravis_corpus ${folder}/aravis_corpus)
 set_tests_properties(fuzz_aravis PROPERTIES TIMEOUT 120)
+
+# Heads of an O3R and the Visionary; what the facades' fuzzers have is not here again.
+set(drivers ${PROJECT_SOURCE_DIR}/drivers)
+find_package(nlohmann_json REQUIRED)
+add_executable(fuzz_heads ${folder}/fuzz_heads.cpp ${drivers}/o3r/frame_images.cpp ${drivers}/o3r/head.cpp
+               ${drivers}/visionary/frame_images.cpp ${drivers}/lens.cpp ${drivers}/ray_fit.cpp)
+target_link_libraries(fuzz_heads PRIVATE toftwin::o3r_wire toftwin::visionary_wire toftwin::settings toftwin::images
+                      toftwin::calibration nlohmann_json::nlohmann_json fmt::fmt)
+target_link_options(fuzz_heads PRIVATE -fsanitize=fuzzer)
+add_dependencies(fuzzers fuzz_heads)
+file(MAKE_DIRECTORY ${CMAKE_BINARY_DIR}/fuzz_heads_corpus)
+add_test(NAME fuzz_heads
+         COMMAND fuzz_heads -max_total_time=3 -max_len=4096 -print_final_stats=1
+                 ${CMAKE_BINARY_DIR}/fuzz_heads_corpus ${folder}/heads_corpus)
+set_tests_properties(fuzz_heads PROPERTIES TIMEOUT 120)

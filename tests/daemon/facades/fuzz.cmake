@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # Like tests/protocol/fuzz.cmake, for what clients of facades send. Without sockets, sources or threads.
 find_package(Boost 1.74 REQUIRED)
+find_package(OpenSSL REQUIRED)
 set(folder ${PROJECT_SOURCE_DIR}/tests/daemon/facades)
 set(facades ${PROJECT_SOURCE_DIR}/daemon/facades)
 
@@ -25,6 +26,15 @@ set(o3d303 answers.cpp auto_exposure.cpp bindings.cpp clipping.cpp device.cpp de
            device_frames.cpp device_source.cpp device_transfer.cpp rules.cpp schemas.cpp)
 list(TRANSFORM o3d303 PREPEND ${facades}/o3d303/)
 toftwin_fuzz_facade(o3d303 ${o3d303} ${ifm} ${facades}/local_place.cpp)
+find_package(nlohmann_json REQUIRED)
+set(o3r bindings.cpp configuration.cpp device.cpp parameters.cpp plugs.cpp sealed_box.cpp)
+list(TRANSFORM o3r PREPEND ${facades}/o3r/)
+toftwin_fuzz_facade(o3r ${o3r})
+target_link_libraries(fuzz_o3r_facade PRIVATE toftwin::o3r_wire PkgConfig::libsodium nlohmann_json::nlohmann_json)
+set(visionary device.cpp session.cpp)
+list(TRANSFORM visionary PREPEND ${facades}/visionary/)
+toftwin_fuzz_facade(visionary ${visionary})
+target_link_libraries(fuzz_visionary_facade PRIVATE toftwin::visionary_wire OpenSSL::Crypto)
 toftwin_fuzz_facade(ros2 ${facades}/ros2/pose.cpp)
 toftwin_fuzz_facade(modbus ${facades}/modbus/identification.cpp ${facades}/modbus/registers.cpp ${facades}/modbus/requests.cpp)
 set(gige_vision bootstrap_registers.cpp device.cpp device_write.cpp features.cpp genicam_xml.cpp gvcp.cpp gvsp.cpp images.cpp memory.cpp)
