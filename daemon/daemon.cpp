@@ -46,9 +46,11 @@ Hub::Options hubOptions(const Config& config) {
   const auto bytes = [](int megabytes) { return static_cast<std::uint64_t>(megabytes) << 20; };
   const RecordingKeys& recording = config.keys.recording;
   return {.recording_folder = config.recording_folder,
-          .recording = {.chunk_time = std::chrono::milliseconds{500},
+          .recording = {.chunk_time = std::chrono::milliseconds{250},
                         .most_bytes = bytes(recording.max_mb),
                         .keep_free_bytes = bytes(recording.keep_free_mb),
+                        .sync_chunks = true,
+                        .now = [] { return std::chrono::steady_clock::now(); },
                         .first_frame_at_once = true},
           .backlog_bytes = bytes(config.keys.limits.subscription_backlog_mb),
           .session_bytes = bytes(config.keys.limits.session_backlog_mb),

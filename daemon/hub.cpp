@@ -157,7 +157,6 @@ void Hub::keepRecording(const std::string& source, const RecordPlan& plan) {
                               std::make_shared<Account>(recordings_budget_, now.recordings_bytes),
                               {.name = "the configuration", .text = "the configuration"}};
   recording.plan = plan;
-  recording.file.sync_chunks = true;
   recording.clock = &clock_;
   auto recorder = std::make_shared<Recorder>(*host, plan.pattern, std::move(recording));
   {

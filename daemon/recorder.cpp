@@ -184,15 +184,26 @@ Result<> Recorder::recordUntilEnd(const Done& opened) {
 Result<> Recorder::writeAll(record::Writer& writer, const SubscriberPtr& subscriber) {
   bool is_unsubscribed = false;
   while (true) {
-    const auto frame = nextFrame(subscriber, is_unsubscribed);
+    const auto frame = nextFrame(subscriber, &writer, is_unsubscribed);
     if (!frame) return frame.error();
     if (!*frame) return {};
-    if (auto written = writer.write((*frame)->frame); !written) return written;
+    if (auto written = writeNext(writer, **frame); !written) return written;
   }
 }
 
-/// Waits for it; null at the source's end, and when all is written after the recording was stopped.
-Result<PreparedFramePtr> Recorder::nextFrame(const SubscriberPtr& subscriber, bool& is_unsubscribed) {
+bool isBehind(SteadyTime made_at, SteadyTime now, std::chrono::milliseconds chunk_time) {
+  return now - made_at > chunk_time / 2;
+}
+
+/// What waits is lost if the daemon is killed; packing is what takes longest.
+Result<> Recorder::writeNext(record::Writer& writer, const PreparedFrame& frame) const {
+  writer.setHurried(isBehind(frame.made_at, std::chrono::steady_clock::now(), options_.file.chunk_time));
+  return writer.write(frame.frame);
+}
+
+/// Waits for it, and finishes a chunk meanwhile that has been open for long enough. Null at the source's end, and when all is
+/// written after the recording was stopped.
+Result<PreparedFramePtr> Recorder::nextFrame(const SubscriberPtr& subscriber, record::Writer* writer, bool& is_unsubscribed) {
   while (true) {
     if (auto item = subscriber->backlog.take()) {
       if (auto* delivery = std::get_if<Backlog::Delivery>(&*item)) return std::move(delivery->frame);
@@ -211,7 +222,15 @@ Result<PreparedFramePtr> Recorder::nextFrame(const SubscriberPtr& subscriber, bo
       is_unsubscribed = true;
       continue;
     }
-    work_->changed.wait(lock, [this] { return work_->has_items || work_->is_stopping; });
+    const auto is_woken = [this] { return work_->has_items || work_->is_stopping; };
+    const auto due = writer != nullptr ? writer->dueAt() : std::nullopt;
+    if (!due) {
+      work_->changed.wait(lock, is_woken);
+    } else if (!work_->changed.wait_until(lock, *due, is_woken)) {
+      lock.unlock();
+      if (auto closed = writer->closeDue(); !closed) return closed.error();
+      continue;
+    }
     work_->has_items = false;
   }
 }

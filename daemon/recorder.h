@@ -23,6 +23,10 @@ namespace toftwin::daemon {
 Result<std::filesystem::path> recordingPath(const std::filesystem::path& folder,
                                             std::string_view name);
 
+/// Whether a frame that was made then has waited for so long that the next ones have to hurry, so that no more than two chunks
+/// of that time are lost at once.
+bool isBehind(SteadyTime made_at, SteadyTime now, std::chrono::milliseconds chunk_time);
+
 /// Writes every frame of a source into a file, on a thread of its own. A disk that is slower than
 /// the source ends the recording with Overrun; a full one, or a bound on the file or on the free
 /// space, with StorageFull. What was written before stays.
@@ -64,10 +68,11 @@ class Recorder {
   Result<> recordUntilEnd(const Done& opened);
   void recordOnAndOn();
   Result<> recordFiles();
-  Result<PreparedFramePtr> nextFrame(const SubscriberPtr& subscriber, bool& is_unsubscribed);
+  Result<PreparedFramePtr> nextFrame(const SubscriberPtr& subscriber, record::Writer* writer, bool& is_unsubscribed);
+  Result<> writeNext(record::Writer& writer, const PreparedFrame& frame) const;
   Result<> writeAll(record::Writer& writer, const SubscriberPtr& subscriber);
   Result<> openNext(std::optional<record::Writer>& writer);
-  Result<> writeInto(std::optional<record::Writer>& writer, const Frame& frame);
+  Result<> writeInto(std::optional<record::Writer>& writer, const PreparedFrame& frame);
   Result<> closeLast(std::optional<record::Writer>& writer);
   [[nodiscard]] Wish everything() const;
   Result<SubscriberPtr> subscribe();

@@ -76,12 +76,12 @@ Result<> Recorder::recordFiles() {
   bool is_unsubscribed = false;
   Result<> outcome;
   while (outcome) {
-    auto frame = nextFrame(*subscribed, is_unsubscribed);
+    auto frame = nextFrame(*subscribed, writer ? &*writer : nullptr, is_unsubscribed);
     if (!frame || !*frame) {
       outcome = frame ? Error{Error::Code::EndOfStream, "the source has ended"} : frame.error();
       break;
     }
-    outcome = writeInto(writer, (*frame)->frame);
+    outcome = writeInto(writer, **frame);
     if (outcome) noteProblem({});
   }
   const Result<> closed = closeLast(writer);
@@ -90,17 +90,17 @@ Result<> Recorder::recordFiles() {
 }
 
 /// Into the file that is due.
-Result<> Recorder::writeInto(std::optional<record::Writer>& writer, const Frame& frame) {
+Result<> Recorder::writeInto(std::optional<record::Writer>& writer, const PreparedFrame& frame) {
   const std::int64_t age_ns = options_.clock->wall().ns - began_.ns;
   const std::int64_t split_ns = std::chrono::nanoseconds{options_.plan->split}.count();
   if (!writer || (split_ns > 0 && age_ns >= split_ns)) {
     if (auto opened = openNext(writer); !opened) return opened;
   }
-  const Result<> written = writer->write(frame);
+  const Result<> written = writeNext(*writer, frame);
   if (written || written.error().code != Error::Code::StorageFull || writer->frames() == 0) return written;
   // It has the size at which it is split, or its disk is full: older ones may make room.
   if (auto opened = openNext(writer); !opened) return opened;
-  return writer->write(frame);
+  return writeNext(*writer, frame);
 }
 
 Result<> Recorder::closeLast(std::optional<record::Writer>& writer) {

@@ -62,6 +62,7 @@ Result<> FileWriter::write(const Message& head,
                            std::span<const std::span<const std::byte>> pieces) {
   if (failed_) return *failed_;
   const bool first = open_messages_ == 0;
+  if (first && options_.now) opened_at_ = options_.now();
   open_start_ns_ = first ? head.log_time_ns : std::min(open_start_ns_, head.log_time_ns);
   open_end_ns_ = first ? head.log_time_ns : std::max(open_end_ns_, head.log_time_ns);
   MessageIndex& index = open_index_[head.channel_id];
@@ -82,8 +83,20 @@ bool FileWriter::openChunkIsDue(std::uint64_t log_time_ns) const {
   const bool slow =
       messages() > 1 && log_time_ns > previous_ns_ && log_time_ns - previous_ns_ >= most;
   const bool is_first = options_.first_frame_at_once && messages() == 1;
-  return is_first || open_.size() >= options_.chunk_bytes || open_end_ns_ - open_start_ns_ >= most || slow;
+  return is_first || open_.size() >= options_.chunk_bytes || open_end_ns_ - open_start_ns_ >= most || slow ||
+         hasBeenOpenFor(options_.chunk_time);
 }
+
+bool FileWriter::hasBeenOpenFor(std::chrono::milliseconds time) const {
+  return open_messages_ > 0 && options_.now && options_.now() - opened_at_ >= time;
+}
+
+std::optional<std::chrono::steady_clock::time_point> FileWriter::dueAt() const {
+  if (open_messages_ == 0 || !options_.now || failed_) return std::nullopt;
+  return opened_at_ + options_.chunk_time;
+}
+
+Result<> FileWriter::closeDue() { return hasBeenOpenFor(options_.chunk_time) ? finishChunk() : Result<>{}; }
 
 /// Upper bounds of the records' sizes (opcode and length included), by mcap.dev/spec.
 std::uint64_t FileWriter::closedSize(std::uint64_t message_bytes, std::uint64_t channel_bytes) const {
@@ -103,7 +116,7 @@ std::uint64_t FileWriter::closedSize(std::uint64_t message_bytes, std::uint64_t 
 Result<> FileWriter::finishChunk() {
   if (failed_) return *failed_;
   if (open_.empty()) return {};
-  const bool is_packed = options_.zstd_level > 0 && open_.size() <= kMaxUnpackedBytes;
+  const bool is_packed = options_.zstd_level > 0 && !is_hurried_ && open_.size() <= kMaxUnpackedBytes;
   ChunkHead head{.start_time_ns = open_start_ns_,
                  .end_time_ns = open_end_ns_,
                  .uncompressed_size = open_.size(),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <map>
@@ -29,6 +30,10 @@ class FileWriter {
   Result<std::uint16_t> addChannel(Channel channel);
   /// Adds a message of a channel that was added; `head.data` is not looked at, `pieces` are.
   Result<> write(const Message& head, std::span<const std::span<const std::byte>> pieces);
+  /// See Writer.
+  void setHurried(bool is_hurried) { is_hurried_ = is_hurried; }
+  [[nodiscard]] std::optional<std::chrono::steady_clock::time_point> dueAt() const;
+  Result<> closeDue();
   Result<> close();
   /// Messages in finished chunks, which are in the file, and in the open one.
   [[nodiscard]] std::uint64_t messages() const { return statistics_.messages + open_messages_; }
@@ -45,6 +50,7 @@ class FileWriter {
   FileWriter(OutputFile file, const WriterOptions& options)
       : file_(std::move(file)), options_(options) {}
   [[nodiscard]] bool openChunkIsDue(std::uint64_t log_time_ns) const;
+  [[nodiscard]] bool hasBeenOpenFor(std::chrono::milliseconds time) const;
   Result<> append(std::span<const std::byte> bytes);
   Result<> finishChunk();
   void count(const ChunkHead& chunk);
@@ -53,12 +59,14 @@ class FileWriter {
   WriterOptions options_;
   std::optional<Error> failed_;
   bool closed_ = false;
+  bool is_hurried_ = false;
   std::uint32_t data_crc_ = 0;
 
   Bytes open_;  // records of the open chunk
   std::uint64_t open_messages_ = 0, lost_ = 0;
   std::uint64_t open_start_ns_ = 0, open_end_ns_ = 0;
   std::uint64_t previous_ns_ = 0;
+  std::chrono::steady_clock::time_point opened_at_;  ///< when its first message came, where `now` tells
   std::map<std::uint16_t, MessageIndex> open_index_;
 
   std::vector<Schema> schemas_;

@@ -5,8 +5,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,6 +31,9 @@ struct WriterOptions {
   bool overwrite = false;  ///< otherwise a file that is there already is an error
   /// Has every chunk brought to the disk, aside, so that a power cut loses what came while that took.
   bool sync_chunks = false;
+  /// Tells the time, where a chunk is not to stay open for longer than `chunk_time` by that, either, however old the frames
+  /// are that come; see closeDue. Without it a file of the same frames has the same bytes.
+  std::function<std::chrono::steady_clock::time_point()> now{};
   /// The first frame is a chunk of its own, so that a file is without frames for no longer than that takes to write.
   bool first_frame_at_once = false;
 };
@@ -47,6 +52,12 @@ class Writer {
   /// the file still opens. The same when the frame would break a bound of the options: everything
   /// before it is kept.
   Result<> write(const Frame& frame);
+  /// Whether frames wait longer than they should: chunks are written as they are then, which is quicker than packing them.
+  void setHurried(bool is_hurried);
+  /// By when closeDue is to be called if no frame comes; nothing if no chunk is open, or without `now`.
+  [[nodiscard]] std::optional<std::chrono::steady_clock::time_point> dueAt() const;
+  /// Finishes the open chunk if it has been open for `chunk_time`.
+  Result<> closeDue();
   Result<> close();
   /// Frames that are in the file, or will be once their chunk is finished.
   [[nodiscard]] std::uint64_t frames() const;

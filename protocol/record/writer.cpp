@@ -127,6 +127,9 @@ Result<> Writer::write(const Frame& frame) {
   return state_->file.write(head, pieces);
 }
 
+void Writer::setHurried(bool is_hurried) { state_->file.setHurried(is_hurried); }
+std::optional<std::chrono::steady_clock::time_point> Writer::dueAt() const { return state_->file.dueAt(); }
+Result<> Writer::closeDue() { return state_->file.closeDue(); }
 Result<> Writer::close() { return state_->file.close(); }
 std::uint64_t Writer::frames() const { return state_->file.messages(); }
 std::uint64_t Writer::lost() const { return state_->file.lost(); }

@@ -7,6 +7,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "daemon/recorder.h"
+
 namespace toftwin::daemon {
 namespace {
 
@@ -106,6 +108,13 @@ TEST_F(Plan, SaysHowLongTheDiskLasts) {
   EXPECT_TRUE(here->pattern.is_absolute());
   EXPECT_THAT(howLong(plan(keysOf("a", "", "3600MB")), 0, 1e6),
               testing::AllOf(HasSubstr("1.0 h at 1.0 MB/s"), HasSubstr("the oldest files make room")));
+}
+
+TEST(Recorder, HurriesOnceAFrameHasWaitedForHalfAChunk) {
+  const SteadyTime made{10s};
+  EXPECT_FALSE(isBehind(made, made, 250ms));
+  EXPECT_FALSE(isBehind(made, made + 125ms, 250ms));
+  EXPECT_TRUE(isBehind(made, made + 126ms, 250ms));
 }
 
 }  // namespace

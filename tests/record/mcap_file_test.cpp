@@ -238,6 +238,63 @@ TEST(McapWriter, ASourceSlowerThanTheChunkTimeLosesNothingToAKill) {
   EXPECT_EQ(count, 5);
 }
 
+int messagesOf(const std::filesystem::path& file) {
+  auto reader = FileReader::open(file);
+  int count = 0;
+  if (reader) expectMessages(*reader, 0, &count);
+  return count;
+}
+
+/// Of messages whose own times are all alike, as of a writer that is far behind: only the clock says that time goes by.
+struct SlowClock {
+  std::chrono::steady_clock::time_point time{};
+  WriterOptions options() {
+    return {.chunk_time = std::chrono::milliseconds{250}, .now = [this] { return time; }};
+  }
+};
+
+TEST(McapWriter, NoChunkStaysOpenLongerThanTheClockAllows) {
+  Folder folder;
+  SlowClock clock;
+  FileWriter writer = begin(folder / "a.mcap", clock.options());
+  add(writer, 0, 0);
+  clock.time += std::chrono::milliseconds{249};
+  add(writer, 1, 1);
+  EXPECT_EQ(messagesOf(folder / "a.mcap"), 0) << "no chunk is due";
+  clock.time += std::chrono::milliseconds{1};
+  add(writer, 2, 0);
+  EXPECT_EQ(messagesOf(folder / "a.mcap"), 3) << "what a kill leaves";
+}
+
+TEST(McapWriter, AChunkThatIsDueIsFinishedWithoutAnotherMessage) {
+  Folder folder;
+  SlowClock clock;
+  FileWriter writer = begin(folder / "a.mcap", clock.options());
+  EXPECT_EQ(writer.dueAt(), std::nullopt);
+  add(writer, 0, 0);
+  EXPECT_EQ(writer.dueAt(), clock.time + std::chrono::milliseconds{250});
+  clock.time += std::chrono::milliseconds{249};
+  ASSERT_TRUE(writer.closeDue());
+  EXPECT_EQ(messagesOf(folder / "a.mcap"), 0);
+  clock.time += std::chrono::milliseconds{1};
+  ASSERT_TRUE(writer.closeDue());
+  EXPECT_EQ(messagesOf(folder / "a.mcap"), 1);
+  EXPECT_EQ(writer.dueAt(), std::nullopt);
+}
+
+TEST(McapWriter, InAHurryChunksAreNotPackedAndReadTheSame) {
+  Folder folder;
+  const auto sizeOf = [&](const char* name, bool is_hurried) {
+    FileWriter writer = begin(folder / name, {});
+    writer.setHurried(is_hurried);
+    for (int i = 0; i < 20; ++i) add(writer, i, static_cast<std::uint16_t>(i % 2));
+    EXPECT_TRUE(writer.close());
+    EXPECT_EQ(messagesOf(folder / name), 20);
+    return std::filesystem::file_size(folder / name);
+  };
+  EXPECT_GT(sizeOf("hurried.mcap", true), sizeOf("packed.mcap", false));
+}
+
 TEST(McapReader, WhatIsNoRecordingIsNamed) {
   Folder folder;
   for (const std::string content : {"", "short", "PNG or whatever, but not MCAP"}) {
