@@ -6,8 +6,6 @@
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/post.hpp>
-#include <boost/asio/ssl/host_name_verification.hpp>
-#include <boost/asio/ssl/stream.hpp>
 #include <boost/asio/write.hpp>
 
 #include <algorithm>
@@ -15,6 +13,7 @@
 #include <cstring>
 
 #include "protocol/transport/tls_context.h"
+#include "protocol/transport/tls_stream.h"
 #include "protocol/wire/crc32c.h"
 
 namespace toftwin::transport {
@@ -46,13 +45,6 @@ union Control {
 
 }  // namespace
 
-struct FramedSocket::Tls {
-  Tls(Socket& socket, std::shared_ptr<const TlsContext> of, asio::ssl::context& ssl)
-      : context(std::move(of)), stream(socket, ssl) {}
-  std::shared_ptr<const TlsContext> context;  // shared with the other connections
-  asio::ssl::stream<Socket&> stream;
-};
-
 FramedSocket::FramedSocket(Socket socket, wire::Limits limits)
     : socket_(std::move(socket)), limits_(limits), input_(kInput) {}
 
@@ -60,25 +52,16 @@ FramedSocket::~FramedSocket() = default;
 
 void FramedSocket::asyncEncrypt(std::shared_ptr<const TlsContext> context, const std::string& host,
                                 WriteHandler handler) {
-  const bool is_server = context->state_->is_server;
-  asio::ssl::context& ssl = context->state_->context;
-  tls_ = std::make_unique<Tls>(socket_, std::move(context), ssl);
-  if (!is_server) {
-    error_code ignored;
-    tls_->stream.set_verify_callback(asio::ssl::host_name_verification{host}, ignored);
-  }
-  const auto side = is_server ? asio::ssl::stream_base::server : asio::ssl::stream_base::client;
-  tls_->stream.async_handshake(side, [handler = std::move(handler)](error_code fault) {
-    if (!fault) return handler({});
-    const bool is_gone = fault == asio::error::eof || fault.category() == boost::system::system_category();
-    handler(Error{is_gone ? Error::Code::Disconnected : Error::Code::PermissionDenied,
-                  "TLS could not be agreed on: " + fault.message()});
-  });
+  const TlsContext::State& of = *context->state_;
+  tls_ = std::make_unique<TlsStream>(socket_, context, context->state_->context.native_handle(), of.aside.get());
+  if (of.is_server) tls_->beServer();
+  if (!of.is_server) tls_->beClientOf(host);
+  tls_->asyncAgree(std::move(handler));
 }
 
 std::string FramedSocket::certifiedName() const {
   if (!tls_) return {};
-  SSL* const ssl = tls_->stream.native_handle();
+  SSL* const ssl = tls_->ssl();
   X509* const certificate = ::SSL_get1_peer_certificate(ssl);
   if (certificate == nullptr) return {};
   std::string name;
@@ -93,7 +76,10 @@ std::string FramedSocket::certifiedName() const {
 
 template <class Buffers, class Handler>
 void FramedSocket::readSome(const Buffers& buffers, Handler handler) {
-  if (tls_) return tls_->stream.async_read_some(buffers, std::move(handler));
+  if (tls_) {
+    auto kept = std::make_shared<Handler>(std::move(handler));  // which may hold what cannot be copied
+    return tls_->asyncReadSome(buffers, [kept](error_code fault, std::size_t count) { (*kept)(fault, count); });
+  }
   socket_.async_read_some(buffers, std::move(handler));
 }
 
@@ -247,7 +233,9 @@ void FramedSocket::takeRest(Arriving arriving, ReadHandler handler) {
 /// machine spends as much time with waking its receivers as with copying. At the stream's end, and when
 /// the receive window is full, it wakes in any case.
 void FramedSocket::wakeWith(std::size_t bytes) {
-  if (bytes == wakes_with_ || tls_) return;  // encrypted, nobody knows how many bytes come
+  // Encrypted, at least as many are still to come as are wanted beyond those that are here.
+  if (tls_ && bytes > 1) bytes = std::max<std::size_t>(bytes, tls_->atMostBuffered() + 1) - tls_->atMostBuffered();
+  if (bytes == wakes_with_) return;
   wakes_with_ = bytes;
   error_code ignored;
   socket_.set_option(asio::socket_base::receive_low_watermark{static_cast<int>(bytes)}, ignored);
@@ -328,11 +316,8 @@ void FramedSocket::writeRest(std::size_t head_sent, WriteHandler handler) {
   const auto done = [this, handler = std::move(handler)](error_code fault, std::size_t) {
     wrote(fault ? Result<>{disconnected(fault)} : Result<>{}, handler);
   };
-  if (tls_) {
-    asio::async_write(tls_->stream, buffers, done);
-  } else {
-    asio::async_write(socket_, buffers, untilDone, done);
-  }
+  if (tls_) return tls_->asyncWrite(std::move(buffers), [done](error_code fault) { done(fault, 0); });
+  asio::async_write(socket_, buffers, untilDone, done);
 }
 
 void FramedSocket::wrote(Result<> result, const WriteHandler& handler) {

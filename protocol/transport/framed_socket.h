@@ -22,6 +22,8 @@
 
 namespace toftwin::transport {
 
+class TlsStream;
+
 /// A connected TCP or Unix socket; both convert to it.
 using Socket = boost::asio::generic::stream_protocol::socket;
 
@@ -95,8 +97,7 @@ class FramedSocket {
   void wrote(Result<> result, const WriteHandler& handler);
 
   Socket socket_;
-  struct Tls;
-  std::unique_ptr<Tls> tls_;  ///< null: in clear text. Refers to the socket
+  std::unique_ptr<TlsStream> tls_;  ///< null: in clear text. Refers to the socket
   wire::Limits limits_;
   bool accepts_shared_bodies_ = false;
 

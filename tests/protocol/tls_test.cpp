@@ -8,9 +8,13 @@
 #include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 
+#include <algorithm>
+#include <array>
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <vector>
 
 #include "example_messages.h"
 #include "message_json.h"
@@ -49,8 +53,9 @@ class Tls : public testing::Test {
   };
   /// Until both ends know.
   std::unique_ptr<Ends> connect(const TlsFiles& server, const TlsFiles& client, const std::string& host = "localhost",
-                                bool needs_certificate = false) {
-    const auto for_server = TlsContext::forServer(server, needs_certificate);
+                                bool needs_certificate = false, std::shared_ptr<const TlsContext> shared = nullptr) {
+    const auto for_server = shared ? Result<std::shared_ptr<const TlsContext>>{std::move(shared)}
+                                   : TlsContext::forServer(server, needs_certificate);
     const auto for_client = TlsContext::forClient(client);
     EXPECT_TRUE(for_server.ok() && for_client.ok());
     asio::ip::tcp::acceptor acceptor{io_, {asio::ip::address_v4::loopback(), 0}};
@@ -102,6 +107,78 @@ TEST_F(Tls, CarriesEveryKindOfMessageBothWays) {
   }
   const wire::Message large = wire::FrameMessage{1, wire::exampleFrame(1024, 1024)};
   EXPECT_EQ(toJson(sent(*ends->server, *ends->client, large)), toJson(large));
+}
+
+TEST_F(Tls, BodiesOfEverySizeAroundRecordsAndPartsArriveWhole) {
+  const auto ends = connect(files("dock"), files(""));
+  ASSERT_TRUE(ends->agreed());
+  constexpr int kRow = 64, kRecord = (16 << 10) / kRow, kPart = (256 << 10) / kRow;  // bytes, rows, rows
+  for (const int rows : {1, kRecord - 1, kRecord, kRecord + 1, 3 * kRecord, kPart - 2, kPart - 1, kPart, kPart + 1, 2 * kPart, 5 * kPart + 7}) {
+    wire::FrameMessage message{1, wire::exampleFrame(8, 8)};
+    std::vector<std::uint8_t> numbers(static_cast<std::size_t>(rows) * kRow);
+    for (std::size_t i = 0; i < numbers.size(); ++i) numbers[i] = static_cast<std::uint8_t>(i * 2654435761u >> 24);
+    message.frame.camera.width = kRow, message.frame.camera.height = rows;
+    message.frame.planes = {{PlaneKind::Flags, ElementType::U8, kRow, rows, 1, Buffer::adopt(numbers)}};
+    const wire::Message came = sent(*ends->server, *ends->client, message);
+    const auto& frame = std::get<wire::FrameMessage>(came).frame;
+    EXPECT_TRUE(std::ranges::equal(frame.planes.at(0).as<std::uint8_t>(), numbers)) << rows << " rows";
+  }
+}
+
+TEST_F(Tls, BothDirectionsAreUsedAtOnce) {
+  const auto ends = connect(files("dock"), files(""));
+  ASSERT_TRUE(ends->agreed());
+  const wire::Message large = wire::FrameMessage{1, wire::exampleFrame(1024, 768)};
+  int arrived = 0, written = 0;
+  for (auto* side : {ends->server.get(), ends->client.get()}) {
+    side->asyncRead([&](const Result<wire::Message>& result) { arrived += result.ok() ? 1 : 0; });
+    side->asyncWrite(*wire::encode(large), [&](const Result<>& result) { written += result.ok() ? 1 : 0; });
+  }
+  runUntil([&] { return arrived == 2 && written == 2; });
+}
+
+TEST_F(Tls, FramesOfOneDaemonToSeveralClientsArriveWholeWhileTheyAsk) {
+  constexpr int kClients = 4, kRounds = 3;
+  const auto shared = TlsContext::forServer(files("dock"), false);
+  ASSERT_TRUE(shared);
+  std::vector<std::unique_ptr<Ends>> all;
+  for (int i = 0; i < kClients; ++i) all.push_back(connect(files("dock"), files(""), "localhost", false, *shared));
+  const wire::Message large = wire::FrameMessage{1, wire::exampleFrame(1024, 768)};
+  const std::string expected = toJson(large);
+  const wire::Message question = wire::exampleMessages().front().message;
+  for (int round = 0; round < kRounds; ++round) {
+    int arrived = 0, asked = 0, written = 0;
+    for (auto& ends : all) {
+      ends->client->asyncRead([&](const Result<wire::Message>& result) { arrived += result && toJson(*result) == expected ? 1 : 0; });
+      ends->server->asyncRead([&](const Result<wire::Message>& result) { asked += result ? 1 : 0; });
+      ends->server->asyncWrite(*wire::encode(large), [&](const Result<>& result) { written += result ? 1 : 0; });
+      ends->client->asyncWrite(*wire::encode(question), [&](const Result<>& result) { written += result ? 1 : 0; });
+    }
+    runUntil([&] { return arrived == kClients && asked == kClients && written == 2 * kClients; });
+  }
+}
+
+TEST_F(Tls, AByteThatWasChangedOnTheWayEndsTheConnection) {
+  const auto ends = connect(files("dock"), files(""));
+  ASSERT_TRUE(ends->agreed());
+  std::optional<Result<wire::Message>> received;
+  ends->client->asyncRead([&](Result<wire::Message> result) { received = std::move(result); });
+  const std::array<unsigned char, 40> forged{23, 3, 3, 0, 35};  // a record that the key did not make
+  boost::system::error_code fault;
+  ends->server->socket().send(asio::buffer(forged), 0, fault);
+  runUntil([&] { return received.has_value(); });
+  ASSERT_FALSE(*received);
+  EXPECT_EQ(received->error().code, Error::Code::Disconnected);
+}
+
+TEST_F(Tls, APeerThatGoesAwayInTheMiddleIsGone) {
+  const auto ends = connect(files("dock"), files(""));
+  ASSERT_TRUE(ends->agreed());
+  std::optional<Result<>> written;
+  ends->server->asyncWrite(*wire::encode(wire::FrameMessage{1, wire::exampleFrame(2048, 2048)}), [&](Result<> result) { written = std::move(result); });
+  ends->client->close();
+  runUntil([&] { return written.has_value(); });
+  EXPECT_FALSE(*written);
 }
 
 TEST_F(Tls, TellsTheNameOfAClientThatShowsACertificateOfTheAuthority) {
