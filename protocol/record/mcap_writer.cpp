@@ -9,6 +9,13 @@
 #include "protocol/record/compression.h"
 
 namespace toftwin::record::mcap {
+namespace {
+
+/// Two to three times as quick as level 1. Not to pack at all is quicker still, until the disk is what is waited for: then a
+/// killed daemon lost up to 1.2 s, in place of 0.2 s.
+constexpr int kHurriedLevel = -7;
+
+}  // namespace
 
 Result<FileWriter> FileWriter::create(const std::filesystem::path& path,
                                       const WriterOptions& options) {
@@ -116,14 +123,14 @@ std::uint64_t FileWriter::closedSize(std::uint64_t message_bytes, std::uint64_t 
 Result<> FileWriter::finishChunk() {
   if (failed_) return *failed_;
   if (open_.empty()) return {};
-  const bool is_packed = options_.zstd_level > 0 && !is_hurried_ && open_.size() <= kMaxUnpackedBytes;
+  const bool is_packed = options_.zstd_level > 0 && open_.size() <= kMaxUnpackedBytes;
   ChunkHead head{.start_time_ns = open_start_ns_,
                  .end_time_ns = open_end_ns_,
                  .uncompressed_size = open_.size(),
                  .uncompressed_crc = crc32(open_),
                  .compression = is_packed ? "zstd" : ""};
   Bytes compressed;
-  if (is_packed) compressed = compressZstd(open_, options_.zstd_level);
+  if (is_packed) compressed = compressZstd(open_, is_hurried_ ? kHurriedLevel : options_.zstd_level);
   const std::span<const std::byte> stored = is_packed ? compressed : open_;
 
   ChunkIndex index{.start_time_ns = head.start_time_ns,

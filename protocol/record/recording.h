@@ -52,7 +52,7 @@ class Writer {
   /// the file still opens. The same when the frame would break a bound of the options: everything
   /// before it is kept.
   Result<> write(const Frame& frame);
-  /// Whether frames wait longer than they should: chunks are written as they are then, which is quicker than packing them.
+  /// Whether frames wait longer than they should: chunks are packed less and more quickly then.
   void setHurried(bool is_hurried);
   /// By when closeDue is to be called if no frame comes; nothing if no chunk is open, or without `now`.
   [[nodiscard]] std::optional<std::chrono::steady_clock::time_point> dueAt() const;

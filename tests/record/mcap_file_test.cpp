@@ -282,7 +282,7 @@ TEST(McapWriter, AChunkThatIsDueIsFinishedWithoutAnotherMessage) {
   EXPECT_EQ(writer.dueAt(), std::nullopt);
 }
 
-TEST(McapWriter, InAHurryChunksAreNotPackedAndReadTheSame) {
+TEST(McapWriter, InAHurryChunksArePackedLessAndReadTheSame) {
   Folder folder;
   const auto sizeOf = [&](const char* name, bool is_hurried) {
     FileWriter writer = begin(folder / name, {});
