@@ -61,12 +61,18 @@ struct Table::State {
 
 namespace {
 
+/// Of a whole number, too, that lies between two of those that a double has.
+double numberOf(const toml::node& node) {
+  if (const auto whole = node.value_exact<std::int64_t>()) return static_cast<double>(*whole);
+  return node.value_exact<double>().value_or(std::nan(""));
+}
+
 /// The error text for a number that is not what the key wants, or empty.
 std::string whyNot(const toml::node& node, Bounds bounds, std::string_view unit, bool integral) {
   const std::string in_unit = unit.empty() ? "" : fmt::format(" {}", unit);
   if (!node.is_number()) return fmt::format("must be a number{}", unit.empty() ? "" : " in" + in_unit);
   if (integral && !node.is_integer()) return "must be a whole number";
-  const double value = node.value<double>().value();
+  const double value = numberOf(node);
   if (std::isnan(value) || !bounds.contains(value)) {
     return fmt::format("= {:.12g}{} is out of bounds: it must be {}{}", value, in_unit,
                        describe(bounds).empty() ? "a number" : describe(bounds), in_unit);
@@ -134,7 +140,7 @@ std::optional<double> Table::number(std::string_view key, Bounds bounds, std::st
     state_->error(*node, key, why);
     return std::nullopt;
   }
-  return node->value<double>();
+  return numberOf(*node);
 }
 
 std::optional<std::vector<double>> Table::numbers(std::string_view key, Bounds bounds,
@@ -155,7 +161,7 @@ std::optional<std::vector<double>> Table::numbers(std::string_view key, Bounds b
       state_->error(element, fmt::format("{}[{}]", key, values.size()), why);
       return std::nullopt;
     }
-    values.push_back(element.value<double>().value());
+    values.push_back(numberOf(element));
   }
   return values;
 }

@@ -75,6 +75,15 @@ TEST(Settings, AValueOutOfBoundsNamesFileLineKeyBoundAndUnit) {
   EXPECT_THAT(error, HasSubstr("1 to 20000 us"));
 }
 
+TEST(Settings, AWholeNumberThatLiesBetweenTwoOfADoubleIsANumber) {
+  for (const char* text : {"number = 9223372036854775807", "number = 9007199254740993", "numbers = [1, -9223372036854775807]"}) {
+    auto table = Table::parse(text, "f.toml");
+    ASSERT_TRUE(table);
+    EXPECT_TRUE(table->number("number", {}, "", true) || table->numbers("numbers", {}, "", std::nullopt)) << text;
+    EXPECT_TRUE(table->check()) << text;
+  }
+}
+
 TEST(Settings, AnUnknownKeyNamesFileAndLineEvenDeepDown) {
   EXPECT_THAT(errorOf("exposure = 5\n"), HasSubstr("example.toml:1: unknown key \"exposure\""));
   EXPECT_THAT(errorOf("[[lamp]]\npwer = 5\n"), HasSubstr("example.toml:2: unknown key \"pwer\""));
