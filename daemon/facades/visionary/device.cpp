@@ -83,7 +83,8 @@ Device::Told Device::identityVariable(std::string_view name) const {
   if (name == "FirmwareVersion") return Writer{}.text(kFirmware).bytes();
   if (name == "SerialNumber") return Writer{}.text(identity_.serial).bytes();
   if (name == "DImanf") return Writer{}.text("SICK AG").bytes();
-  if (name == "DIornr") return Writer{}.text("1112649").bytes();
+  constexpr std::string_view kOrderNumber = "1112649";
+  if (name == "DIornr") return Writer{}.raw(std::as_bytes(std::span{kOrderNumber})).bytes();
   if (name == "LocationName") return Writer{}.text("not defined").bytes();
   if (name == "BlobTcpPortAPI") return Writer{}.number(static_cast<std::uint16_t>(identity_.stream_port)).bytes();
   if (name == "BlobTransportProtocolAPI") return Writer{}.number(std::uint8_t{0}).bytes();  // TCP
@@ -103,7 +104,14 @@ Device::Told Device::stateVariable(std::string_view name) const {
   // Nothing is tied to the two inputs and outputs.
   if (name == "IOValue") return Writer{}.number(std::int8_t{0}).number(std::int8_t{0}).bytes();
   if (name == "humidity") return Writer{}.number(0.0).bytes();
-  if (name == "TmpLvl") return Writer{}.number(static_cast<float>(facts_.temperature_c)).bytes();
+  constexpr std::uint8_t kGood = 3;
+  if (name == "TmpLvl" || name == "OpVoltageStatus") return Writer{}.number(kGood).bytes();
+  if (name == "illuminationActive") return Writer{}.flag(mode_ != FrontendMode::Stop).bytes();
+  const auto tenths = static_cast<std::int16_t>(std::lround(10.0 * std::clamp(facts_.temperature_c, -300.0, 3000.0)));
+  if (name == "SysTemperatureCurrentValue") return Writer{}.number(tenths).bytes();
+  // Lists, with how many they have before them.
+  if (name == "TemperatureNames") return Writer{}.number(std::uint16_t{1}).text("system").bytes();
+  if (name == "TemperatureValues") return Writer{}.number(std::uint16_t{1}).number(tenths).bytes();
   if (name == "deviceState") return Writer{}.number(std::uint16_t{1}).bytes();
   if (name == "binningOption") return Writer{}.number(std::uint8_t{0}).bytes();
   return std::nullopt;

@@ -38,13 +38,14 @@ Bytes withName(std::string_view letters, const ColaCommand& command, bool has_na
   return writer.raw(rest).bytes();
 }
 
-/// " NAME " and what follows it. A name without a space behind it ends the command.
+/// " NAME " and what follows it; the maker's client in Python leaves the first space out. A name without a space behind it
+/// ends the command.
 std::optional<std::pair<std::string, std::span<const std::byte>>> nameIn(std::span<const std::byte> bytes) {
   const std::string_view text = textOf(bytes);
-  if (!text.starts_with(' ')) return std::nullopt;
-  const std::size_t end = std::min(text.find(' ', 1), text.size());
-  if (end == 1) return std::nullopt;
-  return std::pair{std::string{text.substr(1, end - 1)}, bytes.subspan(std::min(end + 1, bytes.size()))};
+  const std::size_t begin = text.starts_with(' ') ? 1 : 0;
+  const std::size_t end = std::min(text.find(' ', begin), text.size());
+  if (end == begin) return std::nullopt;
+  return std::pair{std::string{text.substr(begin, end - begin)}, bytes.subspan(std::min(end + 1, bytes.size()))};
 }
 
 }  // namespace

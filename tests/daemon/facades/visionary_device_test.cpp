@@ -57,6 +57,13 @@ TEST(Cola2, ATelegramIsAsTheVendorsClientWritesIt) {
   EXPECT_EQ(toftwin::visionary::readCommand(read->command).name, "x");
 }
 
+TEST(Cola2, TheSpaceBeforeANameMayBeMissing) {
+  const auto command = toftwin::visionary::readCommand(bytesOf("MNGetChallenge x"));
+  EXPECT_EQ(command.name, "GetChallenge");
+  EXPECT_EQ(command.params, bytesOf("x"));
+  EXPECT_EQ(toftwin::visionary::readCommand(bytesOf("RN  ")).kind, Kind::Other) << "no name";
+}
+
 TEST(Cola2, WhatStandsBeforeATelegramIsPassedOver) {
   Bytes bytes = bytesOf("noise\x02\x02");
   const Bytes telegram = encode(Telegram{1, 2, bytesOf("Cx")});
@@ -160,6 +167,12 @@ TEST_F(VisionaryDevice, TellsWhoItIs) {
   EXPECT_EQ(Reader{toldOf(ask(Kind::Read, "BlobTcpPortAPI"))}.number<std::uint16_t>(), 2114);
   EXPECT_EQ(errorOf(ask(Kind::Read, "nonsense")), ColaError::UnknownVariable);
   EXPECT_EQ(errorOf(ask(Kind::Call, "nonsense")), ColaError::UnknownMethod);
+}
+
+TEST_F(VisionaryDevice, TemperaturesAreTenthsOfADegreeInAList) {
+  device_.update({.temperature_c = 41.26});
+  EXPECT_EQ(toldOf(ask(Kind::Read, "TemperatureValues")), Writer{}.number(std::uint16_t{1}).number(std::int16_t{413}).bytes());
+  EXPECT_EQ(toldOf(ask(Kind::Read, "TmpLvl")), bytesOf({3}));
 }
 
 TEST_F(VisionaryDevice, ItsLogHas25EntriesOfThatSize) {
