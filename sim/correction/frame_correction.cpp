@@ -9,9 +9,12 @@
 namespace toftwin::sim {
 namespace {
 
+/// Null where the frame has none with one number for each of the camera's pixels: a file may hold anything.
 const Plane* planeOf(const Frame& frame, PlaneKind kind) {
   const Plane* const plane = frame.find(kind);
-  return plane == nullptr || plane->channels != 1 ? nullptr : plane;
+  const bool is_whole = plane != nullptr && plane->channels == 1 && plane->width == frame.camera.width && plane->height == frame.camera.height &&
+                        plane->data.size() == plane->byteSize();
+  return is_whole ? plane : nullptr;
 }
 Plane* planeOf(Frame& frame, PlaneKind kind) { return const_cast<Plane*>(planeOf(std::as_const(frame), kind)); }
 
@@ -46,6 +49,11 @@ void scaleDepth(Image<float>& depth_m, const Image<float>& range_m, const Image<
 
 }  // namespace
 
+FrameCorrection::FrameCorrection(std::shared_ptr<const LearnedCorrection> correction) : correction_(std::move(correction)) {
+  const std::vector<std::string> covariates = correction_->terms.covariates();
+  uses_amplitude_ = correction_->terms.changesAmplitude() || std::ranges::find(covariates, "amplitude_e") != covariates.end();
+}
+
 std::string correctionOf(const Provenance& provenance) {
   const auto said = std::ranges::find_if(provenance.effects, [](const std::string& effect) { return effect.starts_with(kCorrectedBy); });
   return said == provenance.effects.end() ? std::string{} : *said;
@@ -67,9 +75,9 @@ FrameCorrection::Done FrameCorrection::correct(Frame& frame) {
   Plane* const amplitude = planeOf(frame, PlaneKind::Amplitude);
   if ((range == nullptr && depth == nullptr) || !(range == nullptr || range->type == ElementType::F32)) return Done::WithoutRange;
   const Image<float> measured_m = rangesOf(frame);
-  Correction::Images images{measured_m, amplitude == nullptr ? Image<float>{} : floatsOf(*amplitude)};
+  Correction::Images images{measured_m, amplitude == nullptr || !uses_amplitude_ ? Image<float>{} : floatsOf(*amplitude)};
   const Conditions now{.moment = frame.moment, .camera = frame.camera};
-  images = correction_->terms.undone(std::move(images), now);
+  images = undone(std::move(images), now);
   if (depth != nullptr) {
     Image<float> depth_m = floatsOf(*depth);
     scaleDepth(depth_m, images.range_m, measured_m);
@@ -80,6 +88,13 @@ FrameCorrection::Done FrameCorrection::correct(Frame& frame) {
     *amplitude = toPlane(PlaneKind::Amplitude, std::move(images.amplitude));
   note(frame.provenance, now);
   return Done::Corrected;
+}
+
+/// What goes with places alone is computed for the first frame of a camera.
+Correction::Images FrameCorrection::undone(Correction::Images measured, const Conditions& now) {
+  const int width = measured.range_m.width(), height = measured.range_m.height();
+  if (!ready_ || !(ready_for_ == now.camera)) ready_.emplace(correction_->terms.effects(), width, height, now), ready_for_ = now.camera;
+  return ready_->undone(std::move(measured), now);
 }
 
 void FrameCorrection::note(Provenance& provenance, const Conditions& now) const {

@@ -21,10 +21,12 @@ class BasisOfMany {
 
   Basis basis_;
   std::vector<double> numbers_;
-  /// Of a Curve: its knots with one at infinity after the last, and value and slope from each on. Before the first
-  /// knot comes one at minus infinity, so that both ends are constant.
-  std::vector<double> knots_, values_, slopes_, from_;
-  /// For each of equal intervals of x, the last knot before it; empty where two knots share an interval.
+  /// Of a Curve: what it is from one knot to the next. The first piece lies before the first knot, the last ends at infinity; both are constant.
+  struct Piece {
+    double next, from, value, slope;
+  };
+  std::vector<Piece> pieces_;
+  /// For each of equal intervals of x, the piece that it begins in; empty where two knots share an interval.
   std::vector<std::int32_t> before_;
   double first_ = 0.0, intervals_per_x_ = 0.0;
 };

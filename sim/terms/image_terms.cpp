@@ -28,8 +28,12 @@ Varies variesOf(const Argument& argument, const ImageTerms::FieldOf& fieldOf) {
   return varies.value_or(Varies::Frame);
 }
 
-TOFTWIN_SIMD void addKnown(const double* product, double* sums, std::size_t count) {
+TOFTWIN_SIMD void addKnown(const double* __restrict product, double* __restrict sums, std::size_t count) {
   for (std::size_t i = 0; i < count; ++i) sums[i] += product[i] == product[i] ? product[i] : 0.0;
+}
+
+TOFTWIN_SIMD void multiplyEach(const double* __restrict by, double* __restrict product, std::size_t count) {
+  for (std::size_t i = 0; i < count; ++i) product[i] *= by[i];
 }
 
 void multiplyBy(const std::vector<double>& factors, std::span<double> product) {
@@ -113,35 +117,40 @@ void ImageTerms::setFrame(const Lookup& lookup) {
 /// The covariates of a row's pixels, each written once when it is first needed, and room for an argument.
 class ImageTerms::RowValues {
  public:
-  RowValues(const PixelRow& pixels, std::size_t size, std::size_t covariates)
-      : pixels_(pixels), rows_(covariates), argument_(size) {}
+  RowValues(const PixelRow& pixels, std::size_t size, std::size_t covariates, Room& room) : pixels_(pixels), size_(size), room_(room) {
+    room.rows.resize(covariates), room.is_written.assign(covariates, false);
+    room.argument.resize(size), room.product.resize(size);
+  }
 
   std::span<const double> argumentOf(const PixelFactor& factor, const Pixels& at, std::size_t width) {
     const bool is_plain = factor.parts.size() == 1 && factor.parts[0].weight == 1.0 && factor.still.empty() &&
                           factor.of_frame.parts.empty();
     if (is_plain) return rowOf(factor.parts[0].which);
-    std::ranges::fill(argument_, factor.frame_value);
+    std::vector<double>& argument = room_.argument;
+    std::ranges::fill(argument, factor.frame_value);
     for (const auto& [weight, which] : factor.parts) {
       const std::vector<double>& row = rowOf(which);
-      for (std::size_t x = 0; x < argument_.size(); ++x) argument_[x] += weight * row[x];
+      for (std::size_t x = 0; x < size_; ++x) argument[x] += weight * row[x];
     }
     for (const Layer& layer : factor.still)
-      for (std::size_t i = 0; i < argument_.size(); ++i) argument_[i] += layer.at(at.column(i), at.y, width);
-    return argument_;
+      for (std::size_t i = 0; i < size_; ++i) argument[i] += layer.at(at.column(i), at.y, width);
+    return argument;
   }
 
  private:
   const std::vector<double>& rowOf(std::size_t which) {
-    if (rows_[which].empty()) {
-      rows_[which].resize(argument_.size());
-      pixels_(which, rows_[which]);
+    std::vector<double>& row = room_.rows[which];
+    if (!room_.is_written[which]) {
+      row.resize(size_);
+      pixels_(which, row);
+      room_.is_written[which] = true;
     }
-    return rows_[which];
+    return row;
   }
 
   const PixelRow& pixels_;
-  std::vector<std::vector<double>> rows_;
-  std::vector<double> argument_;
+  std::size_t size_;
+  Room& room_;
 };
 
 void ImageTerms::addTerm(const Compiled& term, const Pixels& at, RowValues& values, std::span<double> product,
@@ -150,8 +159,7 @@ void ImageTerms::addTerm(const Compiled& term, const Pixels& at, RowValues& valu
   if (same == 0.0 || std::isnan(same)) return;
   std::ranges::fill(product, same);
   const auto multiplyStill = [&](const double* still) {
-    if (at.columns.empty())
-      for (std::size_t i = 0; i < product.size(); ++i) product[i] *= still[i];
+    if (at.columns.empty()) multiplyEach(still, product.data(), product.size());
     else
       for (std::size_t i = 0; i < product.size(); ++i) product[i] *= still[at.columns[i]];
   };
@@ -161,18 +169,25 @@ void ImageTerms::addTerm(const Compiled& term, const Pixels& at, RowValues& valu
   addKnown(product.data(), sums.data(), sums.size());
 }
 
-void ImageTerms::addTerms(const Pixels& at, const PixelRow& pixels, std::span<double> sums) const {
-  RowValues values{pixels, sums.size(), per_pixel_.size()};
-  std::vector<double> product(sums.size());
-  for (const Compiled& term : terms_) addTerm(term, at, values, product, sums);
+void ImageTerms::addTerms(const Pixels& at, const PixelRow& pixels, std::span<double> sums, Room& room) const {
+  RowValues values{pixels, sums.size(), per_pixel_.size(), room};
+  for (const Compiled& term : terms_) addTerm(term, at, values, room.product, sums);
 }
 
+void ImageTerms::addRow(int y, const PixelRow& pixels, std::span<double> sums, Room& room) const {
+  addTerms({static_cast<std::size_t>(y), {}}, pixels, sums, room);
+}
 void ImageTerms::addRow(int y, const PixelRow& pixels, std::span<double> sums) const {
-  addTerms({static_cast<std::size_t>(y), {}}, pixels, sums);
+  Room room;
+  addRow(y, pixels, sums, room);
 }
 
+void ImageTerms::addAt(std::span<const int> columns, int y, const PixelRow& pixels, std::span<double> sums, Room& room) const {
+  if (!columns.empty()) addTerms({static_cast<std::size_t>(y), columns}, pixels, sums, room);
+}
 void ImageTerms::addAt(std::span<const int> columns, int y, const PixelRow& pixels, std::span<double> sums) const {
-  if (!columns.empty()) addTerms({static_cast<std::size_t>(y), columns}, pixels, sums);
+  Room room;
+  addAt(columns, y, pixels, sums, room);
 }
 
 }  // namespace toftwin::terms

@@ -45,9 +45,17 @@ class ImageTerms {
   [[nodiscard]] const std::vector<std::string>& perPixel() const { return per_pixel_; }
   /// Writes a row of covariate number `which`.
   using PixelRow = std::function<void(std::size_t which, std::span<double> row)>;
-  /// Adds the terms' sum to each of row y. Of different rows safe at the same time.
+  /// What evaluating a row needs, kept from row to row. Of one thread.
+  struct Room {
+    std::vector<std::vector<double>> rows{};  ///< of each covariate of Varies::Pixel
+    std::vector<bool> is_written{};
+    std::vector<double> argument{}, product{};
+  };
+  /// Adds the terms' sum to each of row y. Of different rows safe at the same time, each with a room of its own.
+  void addRow(int y, const PixelRow& pixels, std::span<double> sums, Room& room) const;
   void addRow(int y, const PixelRow& pixels, std::span<double> sums) const;
   /// The same of some pixels of the row alone: `pixels` and `sums` have one number for each of these columns.
+  void addAt(std::span<const int> columns, int y, const PixelRow& pixels, std::span<double> sums, Room& room) const;
   void addAt(std::span<const int> columns, int y, const PixelRow& pixels, std::span<double> sums) const;
 
   /// Whether nothing of it varies from pixel to pixel, so that addRow() asks for no covariate.
@@ -93,7 +101,7 @@ class ImageTerms {
   PixelFactor pixelFactor(const Factor& factor, const FieldOf& fieldOf);
   Layer layerOf(const Argument& argument, Varies varies, const FieldOf& fieldOf) const;
   std::size_t numberOf(const std::string& covariate);
-  void addTerms(const Pixels& at, const PixelRow& pixels, std::span<double> sums) const;
+  void addTerms(const Pixels& at, const PixelRow& pixels, std::span<double> sums, Room& room) const;
   void addTerm(const Compiled& term, const Pixels& at, RowValues& values, std::span<double> product,
                std::span<double> sums) const;
 

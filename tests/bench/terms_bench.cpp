@@ -13,6 +13,7 @@
 #include <toftwin/image.h>
 
 #include "sim/effects/learned/correction.h"
+#include "sim/effects/learned/ready_correction.h"
 #include "sim/terms/image_terms.h"
 
 namespace toftwin::terms {
@@ -79,6 +80,7 @@ Both wholeFrames(const std::vector<std::string>& texts, int rounds) {
                         .flags = {kWidth, kHeight}, .phasors = {}};
   for (std::size_t i = 0; i < image.range_m.size(); ++i)
     image.range_m[i] = 0.5F + 4.0F * static_cast<float>((i * 7919) % 10007) / 10007.0F;
+  sim::ReadyCorrection ready{correction->effects(), kWidth, kHeight, now};
   std::vector<double> added, taken_off;
   const auto timed = [](std::vector<double>& into, const auto& work) {
     const double start = processor_ms();
@@ -89,7 +91,7 @@ Both wholeFrames(const std::vector<std::string>& texts, int rounds) {
     sim::RangeImage after = image;
     timed(added, [&] { after = learned.apply(std::move(after), now, sim::Random{1, 1, 1}); });
     sim::Correction::Images images{after.range_m, after.amplitude};
-    timed(taken_off, [&] { images = correction->undone(std::move(images), now); });
+    timed(taken_off, [&] { images = ready.undone(std::move(images), now); });
   }
   return {medianOf(added), medianOf(taken_off)};
 }

@@ -5,10 +5,12 @@
 #include <gmock/gmock.h>
 
 #include <cmath>
+#include <optional>
 
 #include <toftwin/nan.h>
 
 #include "sim/effects/learned/covariates.h"
+#include "sim/effects/learned/ready_correction.h"
 #include "tests/sim/camera_testing.h"
 #include "tests/sim/terms/random_terms.h"
 
@@ -171,6 +173,42 @@ TEST(Correction, UndoesSeveralEffectsFromTheLastToTheFirst) {
   const auto undone = Correction::of(effects)->undone({image.range_m, {}}, now);
   EXPECT_NEAR(image.range_m(0, 0), 1.1 * (static_cast<double>(imageHere().range_m(0, 0)) + 0.3), 1e-6);
   EXPECT_NEAR(undone.range_m(0, 0), imageHere().range_m(0, 0), 1e-6);
+}
+
+// What is kept from frame to frame must not be that of another frame.
+TEST(Correction, ReadyForACameraGivesEachFrameTheSameBitsAsAlone) {
+  const auto correction = Correction::of({Learned{.title = {}, .terms = LearnedTerms::parsed({
+      "range_mm += 9 * sine(range_mm, 700) * decay(time_s, 300)", "range_mm += 0.2 * column", "range_mm += 4 * class(column, 3, 1) * log(range_mm)",
+      "amplitude_percent += 0.001 * range_mm"})}});
+  ASSERT_TRUE(correction.ok()) << correction.error().message;
+  const CameraInfo camera = cameraHere();
+  std::optional<ReadyCorrection> ready;
+  for (const double time_s : {5.0, 5.0, 400.0, 20.0}) {
+    Moment moment;
+    moment.since_power_on = time_s * second;
+    const Conditions now{moment, camera};
+    if (!ready) ready.emplace(correction->effects(), kWidth, kHeight, now);
+    const RangeImage image = imageHere();
+    const auto kept = ready->undone({image.range_m, image.amplitude}, now), alone = correction->undone({image.range_m, image.amplitude}, now);
+    for (std::size_t i = 0; i < image.range_m.size(); ++i) {
+      if (std::isnan(image.range_m[i])) continue;
+      ASSERT_EQ(kept.range_m[i], alone.range_m[i]) << time_s;
+      ASSERT_EQ(kept.amplitude[i], alone.amplitude[i]) << time_s;
+    }
+  }
+}
+
+TEST(Correction, OfRangesBeyondAllGuessesIsFoundToo) {
+  const auto correction = Correction::of({Learned{.title = {}, .terms = LearnedTerms::parsed({"range_mm += 5 * sine(range_mm, 900)", "range_mm += 0.1 * range_mm"})}});
+  const Moment moment;
+  const CameraInfo camera = cameraHere();
+  Image<float> range_m{4, 1};
+  range_m[0] = 0.03F, range_m[1] = 15.0F, range_m[2] = 40.0F, range_m[3] = -0.2F;
+  const auto undone = correction->undone({range_m, {}}, {moment, camera});
+  for (int i = 0; i < 4; ++i) {
+    const double r = 1e3 * static_cast<double>(undone.range_m(i, 0));
+    EXPECT_NEAR(r + 0.1 * r + 5.0 * std::sin(2.0 * M_PI * r / 900.0), 1e3 * static_cast<double>(range_m(i, 0)), 4e-3) << i;  // a float of 40 m
+  }
 }
 
 // Nothing is r with r + 40 mm · step(r, 2 m) = 2.02 m: what is met is r + t(r) = 2.02 from either side of the jump.

@@ -126,7 +126,7 @@ class Work {
       case sim::FrameCorrection::Done::CorrectedBefore:
         return refused(at(frame, fmt::format("was corrected before, {}: take the recording as it was", sim::correctionOf(frame.provenance))));
       case sim::FrameCorrection::Done::WithoutRange:
-        return refused(at(frame, "has its range in another form than 32-bit numbers, which cannot be corrected"));
+        return refused(at(frame, "has its range in another form than 32-bit numbers, or not one for each pixel of its camera: it cannot be corrected"));
       case sim::FrameCorrection::Done::Corrected:
         break;
     }

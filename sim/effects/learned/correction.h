@@ -10,6 +10,7 @@
 #include <toftwin/result.h>
 
 #include "sim/effects/effect.h"
+#include "sim/effects/learned/decoded_images.h"
 #include "sim/effects/learned/learned.h"
 
 namespace toftwin::sim {
@@ -24,12 +25,11 @@ class Correction {
   /// or other frames carry, light and charges, covariates that a decoded image does not tell.
   static Result<Correction> of(std::vector<Learned> effects);
 
-  struct Images {
-    Image<float> range_m;    ///< NaN where there is none, which stays
-    Image<float> amplitude;  ///< electrons, or empty where nobody knows
-  };
-  /// Where no range gives what was measured (beyond a jump, where curves fold back), the nearest that was met is taken.
+  using Images = DecodedImages;
+  /// Where no range gives what was measured (beyond a jump, where curves fold back), the nearest that was met is taken. Of many frames a
+  /// ReadyCorrection does the same quicker.
   [[nodiscard]] Images undone(Images measured, const Conditions& now) const;
+  [[nodiscard]] const std::vector<Learned>& effects() const { return effects_; }
 
   /// Covariates of the frame that this moment does not tell: terms with them add nothing, and nothing is taken off.
   [[nodiscard]] std::vector<std::string> unknownOf(const Conditions& now) const;
