@@ -2,7 +2,9 @@
 #include "calib/loop/answer.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <functional>
 
 #include <fmt/format.h>
 
@@ -40,6 +42,15 @@ std::pair<double, double> spanOf(const Eigen::VectorXd& curve) {
 
 // ---- One effect ----------------------------------------------------------------------------------------------------
 
+/// "whole", "half", "third", or how often it goes into the nearest known period.
+std::string partWord(const Covariate& c, double length) {
+  static constexpr std::array<std::string_view, 9> kWords{"", "whole", "half", "third", "quarter", "fifth", "sixth", "seventh", "eighth"};
+  for (const double period : c.periods)
+    for (std::size_t k = 1; k < kWords.size(); ++k)
+      if (std::abs(length * static_cast<double>(k) - period) < 1e-6 * period) return std::string{kWords[k]};
+  return "part";
+}
+
 /// What a coefficient of a single part says: "wave of 1409 mm, ±3.2 mm".
 std::string partText(const Discovery& d, const Effect& effect, const Family& family, const double* inner, const double* c) {
   const std::string& unit = d.readings.unit;
@@ -56,6 +67,8 @@ std::string partText(const Discovery& d, const Effect& effect, const Family& fam
   if (family.name == "sigmoid") return fmt::format("a smooth step of {} at {}", quantityText(c[0], unit), at(inner[0]));
   if (family.name == "hinge") return fmt::format("from {} on {} per {}", at(inner[0]), quantityText(c[0], unit), of.empty() ? "unit" : of);
   if (family.name == "bump") return fmt::format("a bump of {} at {}", quantityText(c[0], unit), at(inner[0]));
+  if (family.name == "harmonic")
+    return fmt::format("a wave of {}, a {} of the unambiguous range, with an amplitude of {}", at(inner[0]), partWord(*covariate, inner[0]), quantityText(std::hypot(c[0], c[1]), unit));
   if (family.name == "wave") return fmt::format("a wave of {} with an amplitude of {}", at(inner[0]), quantityText(std::hypot(c[0], c[1]), unit));
   if (family.name == "sawtooth") return fmt::format("a sawtooth of {} with {} a period", at(inner[0]), quantityText(c[0], unit));
   if (family.name == "repeating classes") return fmt::format("it repeats every {}", shown(inner[0]));
@@ -121,6 +134,31 @@ std::string seriesText(const Discovery& d, const Effect& effect) {
   return "A new series begins: " + joined(parts) + ".";
 }
 
+/// Names of the effects that are told together, in the order they are told; of the first `count` of them.
+std::string namesOf(const Discovery& d, const Told& told, std::size_t count) {
+  std::vector<std::string> names;
+  for (std::size_t i = 0; i < count; ++i) names.push_back(joined(headersOf(d.readings, d.mean.effects[told.with[i]].shape.covariates), " with "));
+  return joined(names);
+}
+
+/// Of effects that take each other back: the sum, and what this one says beside those before it.
+std::string sharedText(const Discovery& d, const Told& told, const Effect& effect, const std::string& chance) {
+  const std::string& unit = d.readings.unit;
+  const auto [low, high] = spanOf(told.curve);
+  const auto place = static_cast<std::size_t>(std::ranges::find(told.with, static_cast<std::size_t>(&effect - d.mean.effects.data())) - told.with.begin());
+  const std::string name = joined(headersOf(d.readings, effect.shape.covariates), " with ");
+  const std::string own = fmt::format("from {} to {}", quantityText(low, unit), quantityText(high, unit));
+  if (place > 0) return fmt::format("{}: beside {} it says {} more {}.", name, namesOf(d, told, place), own, chance);
+  const auto [least, largest] = spanOf(told.sum);
+  return fmt::format("{}: {} together from {} to {} about their mean, of which {} alone says {} {}.", name, namesOf(d, told, told.with.size()), quantityText(least, unit),
+                     quantityText(largest, unit), name, own, chance);
+}
+
+std::string takenBackText(const Discovery& d, const Told& told) {
+  return fmt::format("{} change together: their terms are larger than what they say and take each other back. Only their sum is known{}; to tell them apart, change one while the others stay.",
+                     namesOf(d, told, told.with.size()), told.joint > 0.0 ? fmt::format(", of which {} (RMS) is of none alone", quantityText(told.joint, d.readings.unit)) : "");
+}
+
 // ---- The whole -----------------------------------------------------------------------------------------------------
 
 /// The offset at the mean reference: what a gain leaves of it there.
@@ -132,6 +170,14 @@ bool hasRepeats(const Discovery& d) { return d.repeats.deviation > 0.0 && d.repe
 double noiseOf(const Discovery& d) { return hasRepeats(d) ? d.repeats.deviation : d.noise; }
 std::string noiseText(const Discovery& d) {
   return fmt::format("{} scatter by {}", hasRepeats(d) ? "repeats" : "neighbouring rows", quantityText(noiseOf(d), d.readings.unit));
+}
+
+/// What was found does not hold where it was not fitted: that comes first, and nothing is said to be explained.
+std::string notWrittenText(const Discovery& d, const Ladder& ladder, std::vector<std::string> parts, const std::vector<std::string>& names) {
+  const std::string& unit = d.readings.unit;
+  if (!names.empty()) parts.push_back("curves over " + joined(names));
+  return fmt::format("No model is written: with {} {} (RMS) are left on rows that were not used, without any model {}; {}.", parts.empty() ? "a constant" : joined(parts),
+                     quantityText(ladder.last(), unit), quantityText(ladder.first(), unit), noiseText(d));
 }
 
 std::string headlineOf(const Discovery& d, Answer::Tone tone) {
@@ -149,6 +195,7 @@ std::string headlineOf(const Discovery& d, Answer::Tone tone) {
     const auto of = headersOf(d.readings, effect.shape.covariates);
     names.push_back(joined(of, " with "));
   }
+  if (!d.is_written && tone != Answer::Tone::Good) return notWrittenText(d, ladder, rungs, names);
   if (!names.empty()) rungs.push_back("what goes with " + joined(names));
   std::string text = ladder.has_truth ? fmt::format("{} raw (RMS)", quantityText(ladder.first(), unit)) : fmt::format("Readings scatter by {}", quantityText(ladder.first(), unit));
   if (tone == Answer::Tone::Good) return text + ": as much as rows scatter by; nothing else is found.";
@@ -175,7 +222,8 @@ std::vector<std::string> readingsOf(const Discovery& d) {
         out.push_back(fmt::format("{} {} too short by {}: they have wrapped, and are set aside (lines {}).", rows, verb, quantityText(kind.low, unit), lines));
         break;
       case NoReading::Jumped:
-        out.push_back(fmt::format("{} {} by about {} to either side, which no tail of noise does: set aside (lines {}).", rows, kind.rows.size() == 1 ? "jumps" : "jump", quantityText(0.5 * (kind.low + kind.high), unit), lines));
+        out.push_back(fmt::format("{} {} by about {} {}, which no tail of noise does: set aside (lines {}).", rows, kind.rows.size() == 1 ? "jumps" : "jump", quantityText(0.5 * (kind.low + kind.high), unit),
+                                  kind.side == 0 ? "to either side" : kind.side > 0 ? "upwards" : "downwards", lines));
         break;
       default:
         out.push_back(fmt::format("{} {} off by {} to {}, far from all others: set aside (lines {}).", rows, verb, quantityText(kind.low, unit), quantityText(kind.high, unit), lines));
@@ -224,16 +272,22 @@ std::vector<std::string> cautionsOf(const Discovery& d) {
       const auto of = headersOf(d.readings, other.covariates), own = headersOf(d.readings, effect.shape.covariates);
       out.push_back(fmt::format("{} would explain it as well as {} (r = {:.2f}): change one while the other stays.", joined(of, " with "), joined(own, " with "), other.correlation));
     }
-    if (effect.is_between_groups)
+    if (effect.rests_on > 0)
       out.push_back(fmt::format("{} changes only between {}s: what is said of it rests on {} of them.", headerOf(d.readings, effect.shape.covariates.front()),
-                                groupColumn(d.readings), d.open.evidence.groups()));
+                                groupColumn(d.readings), effect.rests_on));
   }
+  for (const Told& told : d.told)
+    if (!told.with.empty() && &told == &d.told[told.with.front()]) out.push_back(takenBackText(d, told));
   for (const Score& score : d.mean.unexplained) {
     const auto of = headersOf(d.readings, score.covariates);
     out.push_back(fmt::format("Something goes with {} (it stands out by {} deviations), but none of the shapes tried predicts rows that were not used.", joined(of, " with "), shown(score.deviate)));
   }
   if (!d.is_written) out.emplace_back("The model leaves more on rows that were not used than no model at all: no file is written.");
-  return out;
+  // What two effects share is said once.
+  std::vector<std::string> each;
+  for (std::string& one : out)
+    if (std::ranges::find(each, one) == each.end()) each.push_back(std::move(one));
+  return each;
 }
 
 }  // namespace
@@ -242,33 +296,57 @@ std::string quantityText(double value, const std::string& unit) {
   return shown(value) + (unit.empty() ? "" : " " + unit);
 }
 
-Eigen::VectorXd curveOf(const Evidence& evidence, const Effect& effect) {
-  const Eigen::VectorXd curve = columnsOf(evidence, effect.shape.columns) * effect.coefficient;
+Eigen::VectorXd curveOf(const Discovery& d, const Effect& effect) {
+  if (const Told* told = toldOf(d, effect)) return told->curve;
+  const Eigen::VectorXd curve = columnsOf(d.open.evidence, effect.shape.columns) * effect.coefficient;
   return curve.array() - curve.mean();
+}
+
+const Told* toldOf(const Discovery& d, const Effect& effect) {
+  const std::less<> isBefore;
+  const Effect* const first = d.mean.effects.data();
+  const bool is_of_mean = !isBefore(&effect, first) && isBefore(&effect, first + d.mean.effects.size());
+  const auto at = is_of_mean ? static_cast<std::size_t>(&effect - first) : d.told.size();
+  return at < d.told.size() ? &d.told[at] : nullptr;
 }
 
 std::string sentenceOf(const Discovery& d, const Effect& effect) {
   if (isSeries(effect)) return seriesText(d, effect);
   const auto of = headersOf(d.readings, effect.shape.covariates);
-  const auto [low, high] = spanOf(curveOf(d.open.evidence, effect));
+  const auto [low, high] = spanOf(curveOf(d, effect));
+  const std::string chance = fmt::format("(p {} {:.4f})", effect.p <= 0.0025 ? "≤" : "=", std::max(effect.p, 0.0001));
+  if (const Told* told = toldOf(d, effect); told && !told->with.empty()) return sharedText(d, *told, effect, chance);
   std::string what;
   if (isGain(d, effect)) what = fmt::format("a gain of {}", percent(effect.coefficient[0]));
   else if (effect.shape.name() == "levels") what = levelsText(d, effect);
   else if (const std::string latency = latencyText(d, effect); !latency.empty()) what = fmt::format("{} ({})", latency, partsText(d, effect));
   else what = partsText(d, effect);
-  return fmt::format("{}: {}; from {} to {} about its mean (p {} {:.4f}).", joined(of, " with "), what, quantityText(low, d.readings.unit), quantityText(high, d.readings.unit),
-                     effect.p <= 0.0025 ? "≤" : "=", std::max(effect.p, 0.0001));
+  return fmt::format("{}: {}; from {} to {} about its mean {}.", joined(of, " with "), what, quantityText(low, d.readings.unit), quantityText(high, d.readings.unit), chance);
 }
+
+namespace {
+
+/// Of squares: a share of 96 % leaves a fifth of the RMS.
+std::string removedText(const Discovery& d) {
+  if (!d.removed.is_known || d.mean.effects.empty()) return {};
+  const auto whole = [](double share) { return compare::shown(100.0 * std::min(share, 1.0), share > 0.99 ? 1 : 0); };
+  return fmt::format("Of what is there beside a constant and the noise the model takes off {} % of the squares (95 % interval: {} to {} %).", whole(d.removed.share),
+                     whole(d.removed.low), whole(d.removed.high));
+}
+
+}  // namespace
 
 Answer answerOf(const Discovery& d) {
   Answer answer;
   const Ladder& ladder = d.unseen.rows > 0 ? d.unseen : d.seen;
   const double noise = noiseOf(d);
   const bool finds_nothing = d.mean.effects.empty() && !d.has_group_offsets && d.mean.unexplained.empty();
-  if (!d.mean.unexplained.empty()) answer.tone = Answer::Tone::Open;
+  // What stands out and predicts nothing is as open as what no shape was found for.
+  if (!d.mean.unexplained.empty() || (!d.is_written && !d.mean.effects.empty())) answer.tone = Answer::Tone::Open;
   else if (finds_nothing && ladder.has_truth && ladder.first() <= kAsNoise * noise) answer.tone = Answer::Tone::Good;
   answer.headline = headlineOf(d, answer.tone);
-  for (const Effect& effect : d.mean.effects) answer.effects.push_back(sentenceOf(d, effect));
+  answer.removed = removedText(d);
+  for (const Effect& effect : d.mean.effects) answer.effects.push_back((d.is_written ? "" : "Not written: ") + sentenceOf(d, effect));
   answer.readings = readingsOf(d);
   answer.cautions = cautionsOf(d);
   return answer;

@@ -40,11 +40,13 @@ Evidence rowsOfGroups(const Evidence& evidence, const Eigen::VectorXd& residual)
   Evidence rows;
   rows.y = meansOf(evidence, residual)(with_rows);
   rows.sigma = Eigen::VectorXd::Ones(rows.y.size());
+  if (evidence.reference.size() > 0) rows.reference = meansOf(evidence, evidence.reference)(with_rows);
   rows.group.assign(static_cast<std::size_t>(rows.y.size()), 0);
   rows.group_names = {""};
   for (const Covariate& c : evidence.covariates) {
-    if (c.varies_within_groups || c.nature == table::Nature::Category) continue;
+    if (c.varies_within_groups || c.is_group_name) continue;
     Covariate one = c;
+    one.varies_within_groups = true;
     one.x = meansOf(evidence, c.x)(with_rows);
     describe(one);
     rows.covariates.push_back(std::move(one));
@@ -79,16 +81,17 @@ std::optional<Candidate> tryShape(const Evidence& rows, Shape shape) {
 
 }  // namespace
 
-std::optional<Effect> explainGroups(const Evidence& evidence, const Eigen::VectorXd& residual, double alpha) {
-  if (groupsWithRows(evidence) < kFewestGroups) return std::nullopt;
-  const Evidence rows = rowsOfGroups(evidence, residual);
+namespace {
+
+/// One simple shape over few groups.
+std::optional<Effect> simpleShape(const Evidence& rows, double alpha) {
   std::vector<Candidate> all;
   for (const Family& family : families()) {
     for (const Covariate& c : rows.covariates) {
       const Covariate* argument = &c;
       const Arguments arguments{&argument, 1};
       const bool is_simple = family.moves.empty() || family.moves == "f";
-      if (family.arguments != 1 || !is_simple || !family.applies(arguments)) continue;
+      if (family.arguments != 1 || !is_simple || c.nature == table::Nature::Category || !family.applies(arguments)) continue;
       for (const Inner& inner : family.grid(arguments)) {
         Shape shape = shapeOf(family, arguments, inner);
         if (shape.columns.size() > 2) continue;
@@ -105,9 +108,37 @@ std::optional<Effect> explainGroups(const Evidence& evidence, const Eigen::Vecto
   // A straight line is simpler than another shape that predicts hardly better.
   for (auto one = all.begin(); one != all.end(); ++one)
     if (one->shape.numbers() == 1 && one->shape.has("straight line") && one->left_out < 1.3 * best->left_out && one->shape.covariates == best->shape.covariates) best = one;
-  Effect effect{.shape = best->shape, .p = std::min(1.0, best->p * tried), .is_between_groups = true};
+  Effect effect{.shape = best->shape, .p = std::min(1.0, best->p * tried)};
   effect.gain.mean = 0.5 * n * std::log(without / std::max(1e-300, best->left_out));
   return effect;
+}
+
+}  // namespace
+
+std::vector<Effect> explainGroups(const Evidence& evidence, const Eigen::VectorXd& residual, const ExplainOptions& options) {
+  const int count = groupsWithRows(evidence);
+  if (count < kFewestGroups) return {};
+  Evidence rows = rowsOfGroups(evidence, residual);
+  if (rows.covariates.empty()) return {};
+  std::vector<Effect> found;
+  if (count >= kGroupsSearched) {
+    ExplainOptions search = options;
+    search.seed += 500;
+    found = explain(rows, search).effects;
+  } else if (auto one = simpleShape(rows, options.alpha)) {
+    found.push_back(*std::move(one));
+  }
+  for (Effect& effect : found) effect.rests_on = count;
+  return found;
+}
+
+double varianceOfGroups(const Evidence& evidence, const Eigen::VectorXd& residual, double freedom) {
+  // A group's mean scatters by s² = Σ m²/freedom; of n rows in it each would by n s².
+  const Eigen::VectorXd mean = meansOf(evidence, residual);
+  const double rows_a_group = static_cast<double>(evidence.rows()) / std::max(1, groupsWithRows(evidence));
+  double squares = 0.0;
+  for (const double m : mean) squares += m * m;
+  return rows_a_group * squares / freedom;
 }
 
 Eigen::VectorXd groupOffsets(const Evidence& evidence, const Eigen::VectorXd& residual) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 
 #include <fmt/format.h>
@@ -55,6 +56,13 @@ std::vector<Eigen::Index> without(const Eigen::Index count, const std::vector<No
   return rows;
 }
 
+/// The rows in the groups that the table gives them, which the search may have taken for one.
+Evidence inGroups(const TableEvidence& table, const table::Readings& readings) {
+  TableEvidence copy{.evidence = table.evidence, .row = table.row};
+  giveGroups(copy, readings);
+  return std::move(copy.evidence);
+}
+
 // ---- The three responses -------------------------------------------------------------------------------------------
 
 /// Coefficients by all rows, of effects whose shapes were found in some.
@@ -74,26 +82,38 @@ Explanation explained(Evidence& e, const ExplainOptions& options) {
   return explanation;
 }
 
-/// The mean: within groups, then between them where their offsets say more than one constant.
+/// Everything that `e` says within groups, then what the groups' means say, each judged by its own units: rows, and groups. `grouped`: the
+/// same rows in their groups, also where `e` has none because they share one offset.
+Explanation explainedByUnits(Evidence& e, const Evidence& grouped, const ExplainOptions& options) {
+  Explanation all = explained(e, options);
+  if (grouped.groups() < 2) return all;
+  const auto most = static_cast<std::size_t>(options.most_effects) + 2;
+  for (bool is_searched = false; !is_searched && all.effects.size() < most;) {
+    const Eigen::VectorXd left = lessEffects(e, all.effects);
+    std::vector<Effect> more = explainGroups(grouped, left, options);
+    if (more.empty()) break;
+    all.p = std::min(all.p, more.front().p);
+    is_searched = more.front().rests_on >= kGroupsSearched;  // until nothing is left
+    const LeastSquares fit = leastSquares(ungrouped(e), left, Eigen::VectorXd::Ones(e.rows()), columnsOf(e, more));
+    const double freedom = std::max(1.0, static_cast<double>(more.front().rests_on - 1 - fit.coefficient.size()));
+    takeNumbers(more, fit, varianceOfGroups(grouped, fit.residual, freedom));
+    std::ranges::move(more, std::back_inserter(all.effects));
+  }
+  return all;
+}
+
+/// The mean: within groups, where their offsets say more than one constant beside what changes within them, and between them.
 void explainMean(Discovery& d, const DiscoverOptions& options) {
   Evidence& e = d.open.evidence;
   const ExplainOptions search{.alpha = options.alpha, .draws = options.draws, .seed = options.seed};
-  if (e.groups() > 1 && chanceOfGroups(e, flexibleColumns(e)) > options.alpha) e = ungrouped(std::move(e));
-  d.mean = explained(e, search);
+  e = inGroups(d.open, d.readings);  // also where an earlier search took them for one
+  const Evidence grouped = e;
+  if (e.groups() > 1 && chanceOfGroups(e, flexibleWithinGroups(e)) > options.alpha) e = ungrouped(std::move(e));
+  d.mean = explainedByUnits(e, grouped, search);
   d.has_group_offsets = false;
   if (e.groups() < 2) return;
-  const auto left = [&] { return lessEffects(e, d.mean.effects); };
-  while (d.mean.effects.size() < 8) {
-    auto more = explainGroups(e, left(), options.alpha);
-    if (!more) break;
-    const Evidence one = ungrouped(e);
-    const Eigen::MatrixXd columns = columnsOf(e, more->shape.columns);
-    const LeastSquares fit = leastSquares(one, left(), Eigen::VectorXd::Ones(e.rows()), columns);
-    more->coefficient = fit.coefficient, more->covariance = fit.covariance;
-    d.mean.effects.push_back(*std::move(more));
-  }
   Evidence rest = e;
-  rest.y = left();
+  rest.y = lessEffects(e, d.mean.effects);
   d.has_group_offsets = chanceOfGroups(rest, Eigen::MatrixXd(e.rows(), 0)) <= options.alpha;
 }
 
@@ -105,12 +125,13 @@ Eigen::VectorXd residualOf(const Discovery& d) {
 
 /// The logarithm of what is left, as a response of its own. It is not of what is exactly 0.
 Explanation explainSpread(const Discovery& d, const DiscoverOptions& options) {
-  Evidence e = ungrouped(d.open.evidence);
+  Evidence grouped = inGroups(d.open, d.readings), e = ungrouped(grouped);
   const Eigen::VectorXd left = residualOf(d);
   const double least = 0.05 * std::max(1e-300, robustScale(left));
   e.y = left.array().abs().max(least).log();
   e.sigma.setOnes();
-  return explained(e, {.alpha = options.alpha, .draws = options.draws, .seed = options.seed + 1000, .most_effects = 2});
+  grouped.y = e.y, grouped.sigma = e.sigma;
+  return explainedByUnits(e, grouped, {.alpha = options.alpha, .draws = options.draws, .seed = options.seed + 1000, .most_effects = 2});
 }
 
 /// What each row scatters by as the spread's effects say, relative to their median.
@@ -146,7 +167,7 @@ std::vector<int> seriesNumbers(const Discovery& d) {
 }
 
 std::optional<Explanation> explainShare(const Discovery& d, const DiscoverOptions& options) {
-  Evidence e = ungrouped(d.all.evidence);
+  Evidence grouped = d.all.evidence, e = ungrouped(grouped);
   e.y.setZero();
   double count = 0.0;
   // That ranges beyond the longest one wrap is known; what is asked is when a reading fails.
@@ -155,7 +176,8 @@ std::optional<Explanation> explainShare(const Discovery& d, const DiscoverOption
       if (kind.kind != NoReading::Wrapped) e.y[row] = 100.0, count += 1.0;
   if (count < 8.0) return std::nullopt;
   e.sigma.setOnes();
-  return explained(e, {.alpha = options.alpha, .draws = options.draws, .seed = options.seed + 2000, .most_effects = 2, .is_robust = false});
+  grouped.y = e.y, grouped.sigma = e.sigma;
+  return explainedByUnits(e, grouped, {.alpha = options.alpha, .draws = options.draws, .seed = options.seed + 2000, .most_effects = 2, .is_robust = false});
 }
 
 }  // namespace
@@ -200,7 +222,10 @@ Result<Discovery> discover(table::Readings readings, const DiscoverOptions& opti
   d.noise = robustScale(noise.residual);
   d.repeats = repeatsOf(d.open.evidence);
   d.overlap = overlapOf(d.open.evidence, lessCurves(d), seriesNumbers(d));
+  d.told = toldOf(d.open.evidence, d.mean.effects);
+  d.numbers = numbersOf(d.open.evidence, d.mean.effects, d.mean.block_length);
   if (auto written = writeModel(d); !written) return written.error();
+  d.removed = removedOf(d.open.evidence, d.mean.effects, d.locked, d.model, d.mean.block_length);
   return d;
 }
 

@@ -9,6 +9,9 @@
 #include "calib/loop/ladder.h"
 #include "calib/loop/no_readings.h"
 #include "calib/loop/overlap.h"
+#include "calib/loop/telling/numbers.h"
+#include "calib/loop/telling/removed.h"
+#include "calib/loop/telling/told.h"
 
 namespace toftwin::loop {
 
@@ -19,6 +22,9 @@ struct Discovery {
   TableEvidence open{}, locked{};  ///< those that measure something: for the search, and for judging it
   std::vector<NoReadings> no_readings{};  ///< numbers of rows are of `all`
   Explanation mean{};            ///< what the error goes with; effects between groups come last
+  std::vector<Told> told{};      ///< of each effect of the mean, on open rows: what is said of it
+  std::vector<std::vector<Number>> numbers{};  ///< of each of them
+  Removed removed{};             ///< what the written model takes off the locked rows
   Explanation spread{};          ///< what the logarithm of its magnitude goes with
   std::optional<Explanation> share{};  ///< what the share of rows that measure nothing goes with, where there are enough
   bool has_group_offsets = false;

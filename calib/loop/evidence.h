@@ -23,6 +23,7 @@ struct Covariate {
   Eigen::VectorXd x{};                ///< of a category, the index into `words`
   std::vector<std::string> words{};   ///< of a category
   std::vector<double> sorted{};       ///< its different values, ascending
+  std::vector<double> periods{};      ///< unambiguous ranges of known modulations, of a length
   double spacing = 0.0;               ///< least difference that is common between neighbouring different values
   bool is_reference = false;          ///< the reference itself
   bool goes_with_lines = false;       ///< it rises or falls with the lines of the file, nearly without exception

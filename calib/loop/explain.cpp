@@ -17,6 +17,12 @@ constexpr std::size_t kShortlist = 3;
 /// Blocks: enough that signs of a hundred of them are a distribution.
 constexpr int kMostBlocks = 150;
 
+/// Whether both name the same covariates, in any order.
+bool areSame(std::vector<std::string> a, std::vector<std::string> b) {
+  std::ranges::sort(a), std::ranges::sort(b);
+  return a == b;
+}
+
 /// The search's state: evidence, what was found, and what all of that leaves.
 class Search {
  public:
@@ -116,7 +122,7 @@ class Search {
     std::optional<Shape> best;
     double most = 0.0;
     for (const Covariate& c : evidence_.covariates) {
-      if (!c.goes_with_lines) continue;
+      if (!c.goes_with_lines || !c.varies_within_groups) continue;
       auto shape = bestStep({evidence_, evidence_.y, weight_, beside, scale_}, c.name);
       if (!shape) continue;
       const double more = beyondWander(*shape, beside) - (c.is_order ? 2.0 : 0.0);
@@ -149,9 +155,19 @@ class Search {
     // Half of the chance of a false alarm is for each order.
     if (scores.all.empty() || scores.p > std::max(0.5 * options_.alpha, 1.0 / options_.draws)) return false;
     if (add(scores)) return true;
-    const auto few = static_cast<std::ptrdiff_t>(std::min<std::size_t>(3, scores.all.size()));
-    out_.unexplained.insert(out_.unexplained.end(), scores.all.begin(), scores.all.begin() + few);
+    noteUnexplained(scores);
     return false;
+  }
+
+  /// The three sets of covariates that stand out most, each once: it is not of interest by how many families. What stands out half as far
+  /// as the first may be chance.
+  void noteUnexplained(const Scores& scores) {
+    constexpr std::size_t kMost = 3;
+    for (const Score& score : scores.all) {
+      if (out_.unexplained.size() >= kMost || score.deviate < 0.5 * scores.all.front().deviate) return;
+      const bool is_there = std::ranges::any_of(out_.unexplained, [&](const Score& one) { return areSame(one.covariates, score.covariates); });
+      if (!is_there) out_.unexplained.push_back(score);
+    }
   }
 
   /// The shape that predicts best, of the covariates that stand out. False if none predicts.
@@ -201,7 +217,9 @@ class Search {
       return fitWander(left.cwiseMin(8.0).cwiseMax(-8.0), evidence_.group).likelihood;
     };
     const double more = likelihood(sideBySide(beside, columnsOf(evidence_, shape.columns))) - likelihood(beside);
-    return more - shape.price - shape.numbers() - kClear;
+    // That was of all shapes. A wander that looks like one of a few waves of a known period is as rare as a false alarm may be.
+    const bool is_known = std::ranges::all_of(shape.families, [](const Family* family) { return family->name == "harmonic"; });
+    return more - shape.price - shape.numbers() - (is_known ? -std::log(options_.alpha) : kClear);
   }
 
   /// Of the blocks of rows, how many lose less with the shape.
@@ -238,8 +256,8 @@ class Search {
     std::vector<Alternative> out;
     const Eigen::VectorXd curve = curveOf(chosen.shape, beside);
     for (const FittedShape& one : all) {
-      if (one.shape.covariates == chosen.shape.covariates || one.shape.covariates.front() == kLine || !(one.worth > 0.0)) continue;
-      if (std::ranges::find(out, one.shape.covariates, &Alternative::covariates) != out.end()) continue;
+      if (areSame(one.shape.covariates, chosen.shape.covariates) || one.shape.covariates.front() == kLine || !(one.worth > 0.0)) continue;
+      if (std::ranges::any_of(out, [&](const Alternative& other) { return areSame(other.covariates, one.shape.covariates); })) continue;
       const auto lost = chosen.held.over(one.held);
       if (lost.mean > 2.0 * lost.error) continue;
       const Eigen::VectorXd other = curveOf(one.shape, beside);

@@ -22,10 +22,10 @@ struct Effect {
   double p = 1.0;  ///< chance of seeing it without any effect
   HeldOut::Gain gain{};  ///< over the model without it, on rows it was not fitted to
   std::vector<Alternative> alternatives{};
-  /// Coefficients of the shape's columns, then its fitted inner numbers, and their covariance.
+  /// Coefficients of the shape's columns, and their covariance while its inner numbers are what they are (all of them: numbersOf()).
   Eigen::VectorXd coefficient{};
   Eigen::MatrixXd covariance{};
-  bool is_between_groups = false;  ///< it changes only from group to group, and rests on as many of them
+  int rests_on = 0;  ///< groups, where it changes only from one to the next: as many as its information is; 0: it changes within them
 };
 
 struct ExplainOptions {

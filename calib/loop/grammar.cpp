@@ -176,6 +176,15 @@ std::vector<double> wavelengths(const Covariate& c, double most) {
   return all;
 }
 std::vector<Inner> waveGrid(Arguments a) { return each(wavelengths(*a[0], 400.0)); }
+/// Of a phase's error: what the samples' harmonics and their number leave has a whole number of periods in the unambiguous range.
+std::vector<Inner> harmonicGrid(Arguments a) {
+  constexpr double kHighest = 8.0;
+  std::vector<Inner> grid;
+  for (const double period : a[0]->periods)
+    for (double k = 1.0; k <= kHighest; k += 1.0)
+      if (period / k >= 2.02 * a[0]->spacing && period / k <= 3.0 * a[0]->span()) grid.push_back({period / k});
+  return grid;
+}
 std::vector<Inner> sawtoothGrid(Arguments a) {
   std::vector<Inner> grid;
   for (const double length : wavelengths(*a[0], 40.0))
@@ -249,6 +258,8 @@ std::vector<Family> singleFamilies() {
      [](Arguments a, const Inner& p) { return single(factor(Basis::Hinge, *a[0], {p[0]})); }, "l", false, true},
     {"bump", 1, one<many<8>>, placeAndWidth,
      [](Arguments a, const Inner& p) { return single(factor(Basis::Bump, *a[0], {p[0], p[1]})); }, "ls", true, true},
+    {"harmonic", 1, [](Arguments a) { return hasManyValues(*a[0], 8) && !harmonicGrid(a).empty(); }, harmonicGrid,
+     [](Arguments a, const Inner& w) { return wave(*a[0], w[0]); }, "f", true, true},
     {"wave", 1, one<many<8>>, waveGrid,
      [](Arguments a, const Inner& w) { return wave(*a[0], w[0]); }, "s", true, true},
     {"sawtooth", 1, one<many<16>>, sawtoothGrid, sawtooth, "sl", true, true},

@@ -35,9 +35,16 @@ Ladder ladderOf(const TableEvidence& table, const Model& model) {
     if (!ladder.has_truth) after.array() -= after.mean();
     return after;
   };
-  ladder.steps.push_back(stepOf("raw", left({})));
-  for (const Rung& rung : model.rungs) ladder.steps.push_back(stepOf(rung.name, left(rung.terms)));
-  ladder.steps.push_back(stepOf("effects", left(termsOf(model))));
+  const auto add = [&](const std::string& name, const std::vector<terms::Term>& terms) {
+    const auto needed = terms::covariatesOf(terms);
+    const bool is_known = std::ranges::all_of(needed, [&](const std::string& one) { return table.evidence.find(one) != nullptr; });
+    if (is_known) ladder.steps.push_back(stepOf(name, left(terms)));
+  };
+  add("raw", {});
+  // A constant and a gain are of a truth.
+  for (const Rung& rung : model.rungs)
+    if (ladder.has_truth) add(rung.name, rung.terms);
+  add("effects", termsOf(model));
   return ladder;
 }
 

@@ -23,7 +23,8 @@ struct Ladder {
   [[nodiscard]] double last() const { return steps.empty() ? 0.0 : steps.back().rms; }
 };
 
-/// What the model's terms leave of these rows' errors, rung by rung.
+/// What the model's terms leave of these rows' errors, rung by rung. A rung that needs what the table lacks is left out; without a
+/// reference, which tells what is constant and how large a gain is, all but the first and the last are.
 Ladder ladderOf(const TableEvidence& table, const Model& model);
 
 /// Of rows in which everything is the same, by how much they scatter; 0 where hardly any are.

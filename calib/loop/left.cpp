@@ -6,7 +6,6 @@
 #include <limits>
 #include <utility>
 
-#include "calib/linear/linear.h"
 
 namespace toftwin::loop {
 
@@ -62,21 +61,14 @@ Eigen::VectorXd Left::coefficients(const Eigen::MatrixXd& columns) const {
   Eigen::MatrixXd x = (*projection_)(columns);
   const Eigen::VectorXd length = x.colwise().norm().transpose().cwiseMax(1e-300);
   x = x * length.cwiseInverse().asDiagonal();
-  const auto pairs = linear::eigenpairs(x.transpose() * x);
-  const double least = 1e-11 * std::max(1e-300, pairs.values.maxCoeff());
-  const Eigen::VectorXd inverse = pairs.values.unaryExpr([&](double v) { return v > least ? 1.0 / v : 0.0; });
-  const Eigen::VectorXd unit = pairs.vectors * (inverse.asDiagonal() * (pairs.vectors.transpose() * (x.transpose() * left_)));
+  const Eigen::VectorXd unit = pseudoInverse(x.transpose() * x) * (x.transpose() * left_);
   return unit.cwiseQuotient(length);
 }
 
 double Left::after(Eigen::MatrixXd x) const {
   for (Eigen::Index c = 0; c < x.cols(); ++c) x.col(c) /= std::max(1e-300, x.col(c).norm());
-  const auto pairs = linear::eigenpairs(x.transpose() * x);
-  const Eigen::VectorXd moment = pairs.vectors.transpose() * (x.transpose() * left_);
-  double explained = 0.0;
-  for (Eigen::Index i = 0; i < moment.size(); ++i)
-    if (pairs.values[i] > 1e-9 * pairs.values.maxCoeff()) explained += moment[i] * moment[i] / pairs.values[i];
-  return before() - explained;
+  const Eigen::VectorXd moment = x.transpose() * left_;
+  return before() - moment.dot(pseudoInverse(x.transpose() * x) * moment);
 }
 
 }  // namespace toftwin::loop

@@ -9,6 +9,7 @@
 
 #include "protocol/settings/describe.h"
 #include "protocol/settings/settings.h"
+#include "sim/images/content_hash.h"
 
 namespace toftwin::loop {
 namespace {
@@ -42,6 +43,15 @@ std::vector<Term> termsIn(settings::Table& table) {
 }
 
 }  // namespace
+
+std::string dataIdOf(const table::Readings& readings) {
+  std::string bytes;
+  const auto add = [&]<class T>(const std::vector<T>& values) {
+    if (!values.empty()) bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
+  };
+  add(readings.line), add(readings.error), add(readings.reference);
+  return sim::contentHash(bytes);
+}
 
 std::vector<Term> termsOf(const Model& model) {
   std::vector<Term> all;
@@ -82,6 +92,7 @@ std::string toToml(const Model& model) {
       "# Learned by toftwin discover {}: measured = true value + the sum of all terms. See docs/discover.md.\n", TOFTWIN_VERSION);
   out += fmt::format("data = {}\nunit = {}\nmeasured = {}\nreference = {}\n", settings::toToml(model.data), settings::toToml(model.unit),
                      settings::toToml(model.measured), settings::toToml(model.reference));
+  if (!model.data_id.empty()) out += fmt::format("data_id = {}\n", settings::toToml(model.data_id));
   for (const LearnedEffect& effect : model.effects) {
     out += fmt::format("\n[[effect]]\ntype = \"learned\"\ntitle = {}\nrole = {}\n", settings::toToml(effect.title), settings::toToml(effect.role));
     if (effect.p > 0.0) out += fmt::format("p = {}\n", settings::toToml(effect.p));
@@ -97,6 +108,7 @@ Result<Model> modelIn(settings::Table table) {
   Model model;
   model.data = table.text("data").value_or(""), model.unit = table.text("unit").value_or("");
   model.measured = table.text("measured").value_or(""), model.reference = table.text("reference").value_or("");
+  model.data_id = table.text("data_id").value_or("");
   for (settings::Table& section : table.tables("effect")) {
     LearnedEffect effect;
     if (const auto type = section.text("type"); type != "learned")

@@ -30,10 +30,14 @@ struct Rung {
 /// was judged.
 struct Model {
   std::string data{}, unit{}, measured{}, reference{};
+  std::string data_id{};  ///< of the rows it was found in (dataIdOf); empty: not known
   std::vector<LearnedEffect> effects{};
   /// Ladder of simpler models, each fitted by itself: a constant; with a gain; with series.
   std::vector<Rung> rungs{};
 };
+
+/// Of a table's rows: their lines, what was measured and what it should have been. 32 hex digits; equal only for the same rows.
+std::string dataIdOf(const table::Readings& readings);
 
 /// All terms of the model.
 std::vector<terms::Term> termsOf(const Model& model);

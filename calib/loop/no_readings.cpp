@@ -245,6 +245,9 @@ NoReadings findJumps(const Evidence& evidence, const Eigen::VectorXd& residual) 
   }
   if (found.rows.empty()) found.kind = NoReading::None;
   std::ranges::sort(found.rows);
+  const auto isHigh = [&](Eigen::Index row) { return residual[row] > 0.0; };
+  if (!found.rows.empty() && std::ranges::all_of(found.rows, isHigh)) found.side = 1;
+  if (!found.rows.empty() && std::ranges::none_of(found.rows, isHigh)) found.side = -1;
   return found;
 }
 

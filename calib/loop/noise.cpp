@@ -55,6 +55,12 @@ Eigen::MatrixXd flexibleColumns(const Evidence& evidence) {
   return columnsOf(evidence, products);
 }
 
+Eigen::MatrixXd flexibleWithinGroups(const Evidence& evidence) {
+  Evidence within = evidence;
+  std::erase_if(within.covariates, [](const Covariate& c) { return !c.varies_within_groups; });
+  return flexibleColumns(within);
+}
+
 Noise judgeNoise(const Evidence& evidence, const Eigen::MatrixXd& model) {
   const Eigen::MatrixXd flexible = flexibleColumns(evidence);
   Eigen::MatrixXd all(evidence.rows(), model.cols() + flexible.cols());
@@ -88,7 +94,6 @@ double chanceOfGroups(const Evidence& evidence, const Eigen::MatrixXd& model) {
 Evidence ungrouped(Evidence evidence) {
   std::ranges::fill(evidence.group, 0);
   evidence.group_names = {""};
-  for (Covariate& c : evidence.covariates) c.varies_within_groups = true;
   return evidence;
 }
 

@@ -55,12 +55,14 @@ Curve lineOf(const Eigen::VectorXd& x, const Eigen::VectorXd& y, std::string nam
 Section ladderSection(const Discovery& d) {
   const Ladder& ladder = judgedOf(d);
   const bool has_repeats = d.repeats.deviation > 0.0;
-  return loop::ladderSection(
+  Section section = loop::ladderSection(
       {.verdict = fmt::format("On {} {}: {} → {} (RMS).", counted(ladder.rows, "row"), d.unseen.rows > 0 ? "that nothing was fitted to" : "that it was fitted to",
                               quantityText(ladder.first(), d.readings.unit), quantityText(ladder.last(), d.readings.unit)),
        .about = fmt::format("{} The last step is the file that was written, read again and applied to these rows.", ladder.has_truth ? "Errors after each model." : "Scatter about the mean: the table has no reference."),
        .unit = d.readings.unit, .steps = ladder.steps, .fitted = d.seen.steps, .noise = has_repeats ? d.repeats.deviation : d.noise,
        .noise_name = has_repeats ? fmt::format("noise of {} repeated rows", d.repeats.rows) : "scatter of neighbouring rows"});
+  if (const std::string removed = answerOf(d).removed; !removed.empty()) section.blocks.push_back(Paragraph{removed, false, {}, {}});
+  return section;
 }
 
 Section referenceSection(const Discovery& d) {
@@ -81,17 +83,24 @@ Section effectSection(const Discovery& d, const Effect& effect, std::size_t numb
   const Evidence& e = d.open.evidence;
   const Covariate* c = e.find(effect.shape.covariates.front());
   Section section{fmt::format("effect-{}", number), fmt::format("Effect {}: {}", number, headerOf(d.readings, effect.shape.covariates.front())), sentenceOf(d, effect), Tone::Neutral, {}};
-  const Eigen::VectorXd curve = curveOf(e, effect);
+  // Of effects that take each other back the dots, too, are of what this one says beside those before it.
+  const Eigen::VectorXd curve = curveOf(d, effect);
   const Eigen::VectorXd left = e.y - predicted(e, termsOf(d.model));
   FigureRow row;
   for (const std::string& name : effect.shape.covariates) {
     const Covariate* over = e.find(name);
-    row.figures.push_back({fmt::format("What the other effects leave (dots), and this effect (line), over {}", headerOf(d.readings, name)),
+    row.figures.push_back({fmt::format("What the others leave (dots), and this effect (line), over {}", headerOf(d.readings, name)),
                            toSvg(Plot{.title = section.title, .x_label = labelled(headerOf(d.readings, name), over->unit), .y_label = labelled("error", d.readings.unit),
                                       .curves = {dotsOf(over->x, curve + left, "rows", Ink::Measured), lineOf(over->x, curve, "effect")}, .zero_line = true,
                                       .compact = effect.shape.covariates.size() > 1})});
   }
   section.blocks.push_back(std::move(row));
+  if (const Told* told = toldOf(d, effect)) {
+    std::vector<std::string> lines;
+    for (const Number& one : d.numbers[static_cast<std::size_t>(told - d.told.data())])
+      lines.push_back(fmt::format("{}: {} ± {}", one.name, shownDigits(one.value, 4), shownDigits(one.half(), 2)));
+    section.blocks.push_back(Details{"Its numbers, with 95 % intervals", std::move(lines)});
+  }
   std::string formula;
   for (const terms::Term& term : termsOf(effect.shape, effect.coefficient, quantityOf(d.readings))) formula += terms::toText(term) + "\n";
   section.blocks.push_back(Details{"Its terms, as model.toml says them", {formula}});
@@ -113,17 +122,31 @@ Json effectJson(const Discovery& d, const Effect& effect) {
   for (const terms::Term& term : termsOf(effect.shape, effect.coefficient, quantityOf(d.readings))) terms.push(terms::toText(term));
   for (const Alternative& other : effect.alternatives)
     others.push(Json::object().set("covariates", Json::arrayOf(headersOf(d.readings, other.covariates))).set("correlation", other.correlation));
-  const Eigen::VectorXd curve = curveOf(d.open.evidence, effect);
+  const Eigen::VectorXd curve = curveOf(d, effect);
   Json json = Json::object();
   json.set("covariates", Json::arrayOf(headersOf(d.readings, effect.shape.covariates))).set("shape", effect.shape.name()).set("sentence", sentenceOf(d, effect));
   json.set("p", effect.p).set("held_out_gain", effect.gain.mean).set("held_out_gain_error", effect.gain.error);
-  json.set("least", curve.minCoeff()).set("largest", curve.maxCoeff()).set("rests_on_groups", effect.is_between_groups);
+  json.set("least", curve.minCoeff()).set("largest", curve.maxCoeff()).set("rests_on_groups", effect.rests_on);
+  const Told* told = toldOf(d, effect);
+  Json shares = Json::array();
+  for (const std::size_t other : told ? told->with : std::vector<std::size_t>{}) shares.push(other);
+  json.set("shares_its_curve_with", std::move(shares));
   return json.set("terms", std::move(terms)).set("alternatives", std::move(others));
+}
+
+/// Of an effect of the mean.
+Json numbersJson(const Discovery& d, const Effect& effect) {
+  Json all = Json::array();
+  const Told* told = toldOf(d, effect);
+  if (!told) return all;
+  for (const Number& number : d.numbers[static_cast<std::size_t>(told - d.told.data())])
+    all.push(Json::object().set("name", number.name).set("value", number.value).set("low", number.value - number.half()).set("high", number.value + number.half()));
+  return all;
 }
 
 Json effectsJson(const Discovery& d, const std::vector<Effect>& effects) {
   Json all = Json::array();
-  for (const Effect& effect : effects) all.push(effectJson(d, effect));
+  for (const Effect& effect : effects) all.push(effectJson(d, effect).set("numbers", numbersJson(d, effect)));
   return all;
 }
 
@@ -143,7 +166,7 @@ Json noReadingsJson(const Discovery& d) {
   for (const NoReadings& kind : d.no_readings) {
     Json lines = Json::array();
     for (const Eigen::Index row : kind.rows) lines.push(d.readings.line[d.all.row[static_cast<std::size_t>(row)]]);
-    all.push(Json::object().set("kind", std::string{wordOf(kind.kind)}).set("rows", kind.rows.size()).set("from", kind.low).set("to", kind.high).set("lines", std::move(lines)));
+    all.push(Json::object().set("kind", std::string{wordOf(kind.kind)}).set("rows", kind.rows.size()).set("from", kind.low).set("to", kind.high).set("side", kind.side).set("lines", std::move(lines)));
   }
   return all;
 }
@@ -190,6 +213,7 @@ Json dataOf(const Discovery& d) {
   json.set("verdict", answer.headline).set("tone", answer.tone == Answer::Tone::Good ? "good" : answer.tone == Answer::Tone::Fair ? "fair" : "open");
   json.set("ladder", ladderJson(judgedOf(d))).set("ladder_of_fitted_rows", ladderJson(d.seen));
   json.set("rows", d.all.evidence.rows()).set("open_rows", d.open.evidence.rows()).set("locked_rows", d.locked.evidence.rows());
+  json.set("removed", d.removed.is_known ? Json::object().set("share", d.removed.share).set("low", d.removed.low).set("high", d.removed.high) : Json{});
   json.set("noise", d.noise).set("noise_of_repeats", d.repeats.deviation > 0.0 ? Json{d.repeats.deviation} : Json{});
   json.set("p", d.mean.p).set("p_left", d.mean.last_p).set("model_is_written", d.is_written);
   json.set("effects", effectsJson(d, d.mean.effects)).set("spread", effectsJson(d, d.spread.effects));

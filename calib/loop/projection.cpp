@@ -86,6 +86,14 @@ Eigen::MatrixXd Projection::operator()(Eigen::MatrixXd columns) const {
   return columns;
 }
 
+Eigen::MatrixXd pseudoInverse(const Eigen::MatrixXd& gram) {
+  constexpr double kLeast = 1e-11;
+  const auto pairs = linear::eigenpairs(gram);
+  const double least = kLeast * std::max(1e-300, pairs.values.maxCoeff());
+  const Eigen::VectorXd inverse = pairs.values.unaryExpr([&](double v) { return v > least ? 1.0 / v : 0.0; });
+  return pairs.vectors * inverse.asDiagonal() * pairs.vectors.transpose();
+}
+
 LeastSquares leastSquares(const Evidence& evidence, const Eigen::VectorXd& y, const Eigen::VectorXd& weight,
                           const Eigen::MatrixXd& columns) {
   const Projection offsets{evidence, weight, Eigen::MatrixXd(y.size(), 0)};
@@ -100,11 +108,7 @@ LeastSquares leastSquares(const Evidence& evidence, const Eigen::VectorXd& y, co
     for (Eigen::Index c = 0; c < length.size(); ++c)
       if (!(length[c] > 1e-10 * whole[c])) length[c] = std::numeric_limits<double>::infinity();
     const Eigen::MatrixXd unit = x * length.cwiseInverse().asDiagonal();
-    const Eigen::MatrixXd gram = unit.transpose() * unit;
-    const auto pairs = linear::eigenpairs(gram);
-    const double least = 1e-11 * std::max(1e-300, pairs.values.maxCoeff());
-    const Eigen::VectorXd inverse = pairs.values.unaryExpr([&](double v) { return v > least ? 1.0 / v : 0.0; });
-    const Eigen::MatrixXd information = pairs.vectors * inverse.asDiagonal() * pairs.vectors.transpose();
+    const Eigen::MatrixXd information = pseudoInverse(unit.transpose() * unit);
     fit.coefficient = length.cwiseInverse().asDiagonal() * (information * (unit.transpose() * left));
     fit.covariance = length.cwiseInverse().asDiagonal() * information * length.cwiseInverse().asDiagonal();
     scaled -= x * fit.coefficient;

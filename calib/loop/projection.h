@@ -39,6 +39,11 @@ double spreadOf(const Eigen::VectorXd& values);
 /// The columns of both side by side.
 Eigen::MatrixXd sideBySide(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b);
 
+/// G⁺ of the Gram matrix G = XᵀX of columns of length 1. Directions whose eigenvalue is below 1e-11 of the largest count as none. Rounding
+/// of the products leaves eigenvalues of up to a hundred columns uncertain by 100 ε = 2e-14 of the largest, a five-hundredth of that; and
+/// along a direction at the limit a coefficient is right to ε/√1e-11 of the response, ten digits.
+Eigen::MatrixXd pseudoInverse(const Eigen::MatrixXd& gram);
+
 /// Coefficients of the least weighted squares of y over these columns beside groups' offsets, and what is left.
 struct LeastSquares {
   Eigen::VectorXd coefficient{};

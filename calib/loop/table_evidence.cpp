@@ -25,24 +25,6 @@ Covariate covariateOf(const table::Column& column, const std::vector<std::size_t
   return c;
 }
 
-/// Rows of one session or capture get its number, in the order that they come.
-void giveGroups(TableEvidence& out, const table::Readings& readings) {
-  Evidence& e = out.evidence;
-  e.group.assign(out.row.size(), 0), e.group_names = {""};
-  const std::string& name = groupColumn(readings);
-  const auto column = std::ranges::find(readings.covariates, name, &table::Column::header);
-  if (name.empty() || column == readings.covariates.end()) return;
-  std::map<double, int> numbers;
-  e.group_names.clear();
-  for (std::size_t i = 0; i < out.row.size(); ++i) {
-    const double value = column->values[out.row[i]];
-    const auto [at, is_new] = numbers.try_emplace(value, static_cast<int>(numbers.size()));
-    if (is_new)
-      e.group_names.push_back(column->words.empty() ? fmt::format("{:g}", value) : column->words[static_cast<std::size_t>(value)]);
-    e.group[i] = at->second;
-  }
-}
-
 /// Whether a column rises or falls with the lines, but for jitter and a few new beginnings.
 bool goesWithLines(const Covariate& c) {
   if (c.nature == table::Nature::Category || c.sorted.size() < 8) return false;
@@ -125,6 +107,23 @@ std::vector<int> seriesOf(std::span<const double> reference) {
   return static_cast<std::size_t>(number) < kMostSeries ? series : none;
 }
 
+void giveGroups(TableEvidence& out, const table::Readings& readings) {
+  Evidence& e = out.evidence;
+  e.group.assign(out.row.size(), 0), e.group_names = {""};
+  const std::string& name = groupColumn(readings);
+  const auto column = std::ranges::find(readings.covariates, name, &table::Column::header);
+  if (name.empty() || column == readings.covariates.end()) return;
+  std::map<double, int> numbers;
+  e.group_names.clear();
+  for (std::size_t i = 0; i < out.row.size(); ++i) {
+    const double value = column->values[out.row[i]];
+    const auto [at, is_new] = numbers.try_emplace(value, static_cast<int>(numbers.size()));
+    if (is_new)
+      e.group_names.push_back(column->words.empty() ? fmt::format("{:g}", value) : column->words[static_cast<std::size_t>(value)]);
+    e.group[i] = at->second;
+  }
+}
+
 TableEvidence evidenceOf(const table::Readings& readings) {
   TableEvidence out;
   std::vector<const table::Column*> columns;
@@ -174,6 +173,7 @@ TableEvidence evidenceOf(const table::Readings& readings) {
   }
   for (Covariate& c : e.covariates) {
     describe(c);
+    if (c.nature == table::Nature::Length) c.periods = e.periods;
     c.goes_with_lines = c.is_order || goesWithLines(c);
   }
   markWithinGroups(e);

@@ -33,6 +33,8 @@ struct TableEvidence {
   [[nodiscard]] bool hasTruth() const { return evidence.reference.size() > 0 || measured.size() == 0; }
 };
 TableEvidence evidenceOf(const table::Readings& readings);
+/// Puts the rows into the groups that the table names, captures or sessions: numbers in the order that they come.
+void giveGroups(TableEvidence& table, const table::Readings& readings);
 
 /// Where the reference begins anew in the file: the number of its series for each row, 0 in all where it never does or where it
 /// does so all the time.

@@ -36,7 +36,7 @@ Model modelOf(const Discovery& d) {
   const auto quantity = quantityOf(d.readings);
   Model model{.data = d.readings.file.filename().string(), .unit = d.readings.unit,
               .measured = d.readings.measured_name.empty() ? d.readings.error_name : d.readings.measured_name,
-              .reference = d.readings.reference_name};
+              .reference = d.readings.reference_name, .data_id = dataIdOf(d.readings)};
   const std::vector<Effect>& effects = d.mean.effects;
   Eigen::VectorXd left = lessEffects(e, effects);
   const Eigen::VectorXd offset = d.has_group_offsets ? groupOffsets(e, left) : Eigen::VectorXd();

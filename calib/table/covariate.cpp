@@ -78,6 +78,7 @@ void convert(Column& column, Quantity quantity, const char* unit) {
   const Unit* there = findUnit(column.unit);
   if (there == nullptr || there->quantity != quantity) return;
   const double factor = factorBetween(column.unit, unit);
+  column.written.factor = factor;
   if (factor != 1.0)
     for (double& value : column.values) value *= factor;
   column.unit = unit;
@@ -150,6 +151,7 @@ Result<Column> covariateOf(const Table& table, std::size_t at, MapNature said, b
   auto values = table.numbers(at);
   if (!values) return values.error();
   Column column{.header = from.header, .unit = from.unit, .nature = nature, .values = *std::move(values)};
+  column.written.unit = from.unit;
   if (nature == Nature::Time || from.kind == Kind::Time) makeTime(from, column, notes);
   if (nature == Nature::Length) convert(column, Quantity::Length, "mm");
   if (nature == Nature::Angle) convert(column, Quantity::Angle, "deg");

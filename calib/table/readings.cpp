@@ -64,6 +64,7 @@ class Reader {
     if (auto done = readGroups(); !done) return done.error();
     if (auto done = readCovariates(); !done) return done.error();
     out_.modulation_mhz = map_.modulation.in(megahertz);
+    if (out_.modulation_mhz == 0.0) takeModulation();
     addNotes(found);
     return std::move(out_);
   }
@@ -84,6 +85,11 @@ class Reader {
     }
     return own > 0.0 ? own : 1.0;
   }
+  /// A column that says none is in the other's.
+  [[nodiscard]] const std::string& writtenUnitOf(std::size_t column, std::optional<std::size_t> other) const {
+    const std::string& own = table_.columns[column].unit;
+    return own.empty() && other && millimetresIn(table_.columns[*other]) > 0.0 ? table_.columns[*other].unit : own;
+  }
   Result<std::vector<double>> scaled(std::size_t column, double factor) {
     auto values = table_.numbers(column);
     if (values)
@@ -101,20 +107,24 @@ class Reader {
       std::optional<std::size_t> column, other;
       std::vector<double>* values;
       std::string* name;
+      AsWritten* written;
     };
-    for (const Wanted& one : {Wanted{roles_.error, roles_.reference, &out_.error, &out_.error_name},
-                              Wanted{roles_.measured, roles_.reference, &out_.measured, &out_.measured_name},
-                              Wanted{roles_.reference, main, &out_.reference, &out_.reference_name}}) {
+    for (const Wanted& one : {Wanted{roles_.error, roles_.reference, &out_.error, &out_.error_name, &out_.error_written},
+                              Wanted{roles_.measured, roles_.reference, &out_.measured, &out_.measured_name, &out_.measured_written},
+                              Wanted{roles_.reference, main, &out_.reference, &out_.reference_name, &out_.reference_written}}) {
       if (!one.column) continue;
-      auto values = scaled(*one.column, factorOf(*one.column, one.other));
+      const double factor = factorOf(*one.column, one.other);
+      auto values = scaled(*one.column, factor);
       if (!values) return values.error();
       *one.values = *std::move(values), *one.name = nameOf(*one.column);
+      *one.written = {.unit = writtenUnitOf(*one.column, one.other), .factor = factor};
     }
     if (!roles_.error) {
       out_.error = out_.measured;
       for (std::size_t i = 0; i < out_.reference.size(); ++i) out_.error[i] -= out_.reference[i];
     } else if (roles_.is_reversed) {
       for (double& one : out_.error) one = -one;
+      out_.error_written.factor = -out_.error_written.factor;
     }
     if (!roles_.sigma) return {};
     auto sigma = scaled(*roles_.sigma, factorOf(*roles_.sigma, main));
@@ -167,6 +177,21 @@ class Reader {
     }
     return {};
   }
+  /// A column of one frequency that is called a modulation's says what the map would.
+  void takeModulation() {
+    for (const TableColumn& column : table_.columns) {
+      const Unit* unit = findUnit(column.unit);
+      if (unit == nullptr || unit->quantity != Quantity::Frequency || !hasWord(column.stem, {"modulation", "modulationsfrequenz"})) continue;
+      std::set<double> different;
+      for (const double value : column.values)
+        if (std::isfinite(value)) different.insert(value);
+      if (different.size() != 1 || !(*different.begin() > 0.0)) continue;
+      out_.modulation_mhz = *different.begin() * unit->in_base;
+      out_.notes.push_back(fmt::format("the modulation is {:g} MHz, as column \"{}\" says", out_.modulation_mhz, column.header));
+      return;
+    }
+  }
+
   /// Texts that hardly ever come twice are remarks, and nothing goes with them.
   bool isNameless(const Column& column) {
     const bool is_empty = std::ranges::none_of(column.values, [](double v) { return std::isfinite(v); });

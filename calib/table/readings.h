@@ -27,6 +27,12 @@ enum class Nature : std::uint8_t {
   Category,  ///< names without order
 };
 
+/// How a column's numbers stand in the file, to write them so again.
+struct AsWritten {
+  std::string unit{};   ///< that header or units row says; may be empty
+  double factor = 1.0;  ///< our values are so many times the file's; negative where an error has the other sign there
+};
+
 struct Column {
   std::string header{};  ///< as in the file, without spaces at its ends
   std::string unit{};    ///< "mm", "s", "degC"; empty where neither header nor units row says one
@@ -35,6 +41,7 @@ struct Column {
   std::vector<std::string> words{};  ///< of a category, in the order they come in the file
   /// Of a column of dates or times of day: its first, from which the values count; seconds since 1970 or midnight.
   std::optional<double> first{};
+  AsWritten written{};  ///< of numbers that do not count from a first
 };
 
 /// The rows of a table with their roles. All vectors have one entry a row, rows in the file's order.
@@ -42,6 +49,7 @@ struct Readings {
   std::filesystem::path file{};
   std::string unit{};               ///< of measured, reference and error: "mm" for every length; else the header's own; may be empty
   std::string measured_name{}, reference_name{}, error_name{};  ///< headers; empty where there is none
+  AsWritten measured_written{}, reference_written{}, error_written{};
   std::vector<double> measured{};   ///< empty where the file gives the error alone; NaN: no reading
   std::vector<double> reference{};  ///< empty where there is none
   std::vector<double> error{};      ///< measured − reference, or as the file gives it; measured alone where there is no reference

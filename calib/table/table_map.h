@@ -50,7 +50,6 @@ struct TableMap {
   std::vector<MappedCovariate> covariates{};
   std::vector<std::string> ignore{};
   Frequency modulation{};
-  bool fits_gain = true;
   double locked_share = 0.2;
   double alpha = 0.01;
   int draws = 400;
@@ -74,8 +73,7 @@ struct TableMap {
     v.texts("ignore", ignore, "columns to leave out");
     v.quantity(
         "modulation", modulation, megahertz, {0.0, 10'000.0},
-        "frequency of the modulation, if known: harmonics of its period are looked for over distances");
-    v.flag("fits_gain", fits_gain, "whether a gain of the measured value is a nuisance, beside an offset");
+        "frequency of the modulation, if known; 0: what a column of one frequency says that is called so. Harmonics of the unambiguous range are looked for over distances, and wrapped readings are known by it");
     v.number("locked_share", locked_share, {0.05, 0.5},
              "without `locked`: of the sessions, or of the rows where sessions are few, that are drawn for "
              "judging");

@@ -2,6 +2,7 @@
 // What `toftwin discover` finds in tables with hidden effects, and how often it finds something where there is nothing.
 //   loop_bench nulls COUNT [seed]            COUNT tables of each of ten kinds of noise, with nothing in them
 //   loop_bench effects COUNT [lambda] [seed] COUNT tables with one hidden effect: one in four of two columns
+//   loop_bench coverage COUNT [seed]         COUNT tables with one hidden law of the grammar: how often 95 % intervals hold the truth
 //   loop_bench speed                         tables of 400 × 6, 40,000 × 10 and 76,000 × 8
 // λ is the hidden effect's energy over the noise's variance. Shapes are drawn here and know nothing of the grammar: some are in it,
 // some are not (Lorentzians, chirps, triangles, products of hyperbolic tangents). What is removed is of the hidden effect, by the
@@ -234,6 +235,88 @@ int effects(int count, double lambda, std::uint64_t seed) {
   return 0;
 }
 
+/// A law whose numbers are known: what intervals are held against.
+struct Law {
+  std::string family;  ///< of the grammar
+  std::size_t column;
+  Function at;         ///< of the column's value
+  std::vector<std::pair<std::string, double>> numbers;  ///< by their names in the answer
+};
+Law drawLaw(Random& random) {
+  constexpr double kTurn = 2.0 * std::numbers::pi;
+  const std::size_t c = std::array<std::size_t, 4>{0, 1, 2, 3}[oneOf(random, 4)];
+  const Drawn& column = kColumns[c];
+  const double span = column.high - column.low, p = between(random, 0.0, 1.0), q = between(random, 0.0, 1.0);
+  switch (oneOf(random, 4)) {
+    case 0: return {"straight line", c, [](double x) { return x; }, {{column.header, 1.0}}};
+    case 1: {
+      const double length = span / (1.7 + 8.0 * p);
+      return {"wave", c, [=](double x) { return std::sin(kTurn * (x / length + q)); }, {{"wavelength", length}}};
+    }
+    case 2: {
+      const double constant = span * (0.08 + 0.3 * p);
+      return {"decay", c, [=](double x) { return std::exp(-x / constant); }, {{"constant of the decay", constant}}};
+    }
+    default: {
+      const double place = column.low + span * (0.2 + 0.6 * p), width = span * (0.05 + 0.1 * q);
+      return {"bump", c, [=](double x) { return std::exp(-0.5 * std::pow((x - place) / width, 2)); }, {{"place", place}, {"width", width}}};
+    }
+  }
+}
+
+/// How many intervals hold what they should.
+struct Held {
+  int in = 0, all = 0;
+  void add(double value, double low, double high) { in += value >= low && value <= high ? 1 : 0, ++all; }
+  [[nodiscard]] std::string text() const { return fmt::format("{} of {} ({:.1f} %)", in, all, 100.0 * in / std::max(1, all)); }
+};
+
+int coverage(int count, std::uint64_t seed) {
+  const std::array<std::size_t, 4> kinds{0, 3, 4, 2};  // white, heavy tails, growing with the range, AR(0.6)
+  std::array<Held, 4> shares{}, numbers{};
+  Held all_shares, all_numbers;
+  int other = 0;
+  for (int s = 0; s < count; ++s) {
+    Random random{seed * 15'485'863 + static_cast<std::uint64_t>(s)};
+    const Law law = drawLaw(random);
+    const Rows rows = drawRows(random, 300), fresh = drawRows(random, 4000);
+    const auto over = [&](const Rows& of) {
+      std::vector<double> values;
+      for (const double x : of[law.column]) values.push_back(law.at(x));
+      return values;
+    };
+    const std::size_t kind = static_cast<std::size_t>(s) % kinds.size();
+    std::vector<double> shape = over(rows), error = drawNoise(random, kNoise[kinds[kind]], rows), truth = over(fresh);
+    const double amplitude = kSigma * std::sqrt(between(random, 150.0, 900.0) / energyOf(shape));
+    for (std::size_t i = 0; i < error.size(); ++i) error[i] += 5.0 + amplitude * shape[i];
+    for (double& t : truth) t = 5.0 + amplitude * t;
+    const auto d = loop::discover(readingsOf(rows, error), {.seed = static_cast<std::uint64_t>(s) + 1});
+    if (!d) return fmt::print("{}\n", d.error().message), 1;
+    if (d->removed.is_known) {
+      const Eigen::VectorXd predicted = loop::predicted(loop::evidenceOf(readingsOf(fresh, truth)).evidence, loop::termsOf(d->model));
+      double left = 0.0;
+      for (std::size_t i = 0; i < truth.size(); ++i) left += std::pow(truth[i] - predicted[static_cast<Eigen::Index>(i)], 2);
+      const double share = 1.0 - left / energyOf(truth);
+      shares[kind].add(share, d->removed.low, d->removed.high), all_shares.add(share, d->removed.low, d->removed.high);
+    }
+    const bool is_law = d->mean.effects.size() == 1 && d->mean.effects[0].shape.name() == law.family &&
+                        d->mean.effects[0].shape.covariates == std::vector<std::string>{kColumns[law.column].header};
+    other += is_law ? 0 : 1;
+    for (const auto& [name, value] : law.numbers)
+      for (const loop::Number& number : is_law ? d->numbers[0] : std::vector<loop::Number>{})
+        if (number.name == name) {
+          const double is = number.is_coefficient ? amplitude * value : value;
+          numbers[kind].add(is, number.value - number.half(), number.value + number.half());
+          all_numbers.add(is, number.value - number.half(), number.value + number.half());
+        }
+  }
+  for (std::size_t k = 0; k < kinds.size(); ++k)
+    fmt::print("{:<24} removed shares {:<24} numbers {}\n", kNoise[kinds[k]].name, shares[k].text(), numbers[k].text());
+  fmt::print("seed {}: {} tables; 95 % intervals hold removed shares in {}, numbers in {}; of {} tables another shape was told\n", seed, count, all_shares.text(),
+             all_numbers.text(), other);
+  return 0;
+}
+
 int speed() {
   struct Size {
     std::size_t rows, columns;
@@ -269,7 +352,8 @@ int main(int argc, char** argv) {
   const auto seedAt = [&](int i) { return argc > i ? std::strtoull(argv[i], nullptr, 10) : 1ULL; };
   if (what == "nulls" && count > 0) return nulls(count, seedAt(3));
   if (what == "effects" && count > 0) return effects(count, argc > 3 ? std::atof(argv[3]) : 600.0, seedAt(4));
+  if (what == "coverage" && count > 0) return coverage(count, seedAt(3));
   if (what == "speed") return speed();
-  fmt::print("usage: loop_bench nulls COUNT [seed] | effects COUNT [lambda] [seed] | speed\n");
+  fmt::print("usage: loop_bench nulls COUNT [seed] | effects COUNT [lambda] [seed] | coverage COUNT [seed] | speed\n");
   return 2;
 }

@@ -119,7 +119,7 @@ TEST(Search, ToldEffectsAreNotLargerThanTheErrors) {
   const Discovery d = found(400, 20, [](const MadeRow& row) { return 0.01 * row.reference_mm + 4.0 / std::cos(row.incidence_deg * std::numbers::pi / 180.0); });
   const double raw = d.open.evidence.y.maxCoeff() - d.open.evidence.y.minCoeff();
   for (const Effect& effect : d.mean.effects) {
-    const Eigen::VectorXd curve = curveOf(d.open.evidence, effect);
+    const Eigen::VectorXd curve = curveOf(d, effect);
     EXPECT_LE(curve.maxCoeff() - curve.minCoeff(), raw) << effect.shape.name();
   }
 }

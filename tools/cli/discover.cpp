@@ -66,6 +66,7 @@ void print(const loop::Discovery& discovery) {
   const loop::Ladder& ladder = is_judged ? discovery.unseen : discovery.seen;
   fmt::print("What is left, RMS of {} rows {}:\n{}\n", ladder.rows, is_judged ? "that nothing was fitted to" : "that it was fitted to",
              loop::ladderText(ladder, discovery.readings.unit));
+  if (!answer.removed.empty()) fmt::print("{}\n", answer.removed);
   for (const std::string& sentence : answer.effects) fmt::print("{}\n", sentence);
   for (const std::string& sentence : answer.readings) fmt::print("{}\n", sentence);
   for (const std::string& sentence : answer.cautions) fmt::print("note: {}\n", sentence);
