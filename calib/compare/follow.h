@@ -9,7 +9,7 @@
 
 #include <toftwin/frame.h>
 
-#include "calib/compare/capture.h"
+#include "calib/compare/feed.h"
 
 /// A twin at the moment of the camera that it is held against: a simulated camera takes time since power-on,
 /// ambient light, room temperature and exposure as parameters.

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "calib/discover/finder.h"
+#include "calib/discover/finding.h"
 
 /// The numbers of effects that were chosen, all at once, with their uncertainties.
 namespace toftwin::discover {

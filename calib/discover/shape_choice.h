@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/discover/finder.h"
+#include "calib/discover/finding.h"
 
 /// Which covariates, and which function of them.
 namespace toftwin::discover {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstddef>
 
-#include "calib/intrinsics/uncertainty.h"
 #include "calib/linear/linear.h"
 
 namespace toftwin::intrinsics {
@@ -74,6 +73,12 @@ Eigen::VectorXd widenedBy(const ClusteredErrors& clustered, const Eigen::VectorX
     if (ratio > kClustered) by[k] = ratio * studentQuantile(clustered.degrees[k]) / studentQuantile(degrees);
   }
   return by;
+}
+
+double studentQuantile(double degrees) {
+  constexpr double z = 1.959964;  // 97.5 % of a normal distribution lie below
+  constexpr double z3 = z * z * z, z5 = z3 * z * z;
+  return z + (z3 + z) / (4.0 * degrees) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * degrees * degrees);
 }
 
 }  // namespace toftwin::intrinsics

@@ -8,6 +8,9 @@
 /// Errors of a least-squares fit whose observations err alike within clusters, by how much the clusters disagree.
 namespace toftwin::intrinsics {
 
+/// 97.5 % of Student's t lie below: the Cornish-Fisher expansion, right to 0.5 % from 4 degrees on.
+double studentQuantile(double degrees);
+
 /// What one cluster of observations says of the parameters.
 struct SharedInformation {
   Eigen::MatrixXd information;  ///< Σ Jᵀ J

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "calib/intrinsics/lens_model.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <Eigen/Geometry>
 
 namespace toftwin::intrinsics {
@@ -100,6 +103,19 @@ BoardPose moved(const BoardPose& pose, const Eigen::Matrix<double, 6, 1>& step) 
   if (angle > 0.0) result.rotation = Eigen::AngleAxisd{angle, turn / angle} * pose.rotation;
   result.translation_mm += step.tail<3>();
   return result;
+}
+
+Gain gainOf(const ModelScore& simpler, const ModelScore& richer) {
+  const std::size_t n = simpler.held_out_by_view.size();
+  double sum = 0.0, squares = 0.0;
+  for (std::size_t v = 0; v < n; ++v) {
+    const double one = 0.5 * std::log((simpler.held_out_by_view[v] + 1e-12) / (richer.held_out_by_view[v] + 1e-12));
+    sum += one;
+    squares += one * one;
+  }
+  const double count = static_cast<double>(n), mean = sum / count;
+  const double variance = n > 1 ? std::max(0.0, squares - count * mean * mean) / (count - 1.0) : HUGE_VAL;
+  return {mean, std::sqrt(variance / count)};
 }
 
 }  // namespace toftwin::intrinsics

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include <Eigen/Core>
 
@@ -51,5 +52,22 @@ Eigen::Vector2d project(const LensParameters& lens, const Eigen::Vector3d& in_ca
 Projection projectWithSlopes(const LensParameters& lens, const BoardPose& pose,
                              const Eigen::Vector3d& on_target_mm);
 BoardPose moved(const BoardPose& pose, const Eigen::Matrix<double, 6, 1>& step);
+
+/// How a lens model and a surface do on views that it has not seen, beside how it does on those that it was fitted to.
+struct ModelScore {
+  LensModel model = LensModel::Pinhole;
+  int degree = 0;  ///< of the board's surface
+  double fitted_rms_px = 0.0;
+  double held_out_rms_px = 0.0;
+  LensParameters lens{};                   ///< fitted to all views
+  std::vector<double> held_out_by_view{};  ///< mean square of each view, px²; its pose is fitted, the lens is not
+};
+/// Relative gain of `richer` over `simpler` on held-out views: mean over views of ln(rms / rms'), with its
+/// standard error. Views of all sizes of error count alike.
+struct Gain {
+  double mean = 0.0, error = 0.0;
+  [[nodiscard]] bool isReal() const { return mean > 2.5 * error; }
+};
+Gain gainOf(const ModelScore& simpler, const ModelScore& richer);
 
 }  // namespace toftwin::intrinsics

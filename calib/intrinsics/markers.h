@@ -9,16 +9,10 @@
 
 #include <toftwin/result.h>
 
+#include "calib/intrinsics/dictionary.h"
 #include "calib/intrinsics/target.h"
 
 namespace toftwin::intrinsics {
-
-/// A dictionary of markers.
-struct Markers {
-  int cells = 0;  ///< across one, with its dark border
-};
-/// An Error if there is no such dictionary, it has fewer than `needed`, or this build cannot read markers.
-Result<Markers> markersOf(const std::string& dictionary, int needed);
 
 /// A corner of the board that a marker told, by index; a board need not be seen whole.
 struct MarkerCorner {

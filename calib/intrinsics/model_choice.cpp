@@ -85,19 +85,6 @@ ModelScore scoreOf(std::vector<Observed> views, const Bundle& start, LensModel m
   return result;
 }
 
-Gain gainOf(const ModelScore& simpler, const ModelScore& richer) {
-  const std::size_t n = simpler.held_out_by_view.size();
-  double sum = 0.0, squares = 0.0;
-  for (std::size_t v = 0; v < n; ++v) {
-    const double one = 0.5 * std::log((simpler.held_out_by_view[v] + 1e-12) / (richer.held_out_by_view[v] + 1e-12));
-    sum += one;
-    squares += one * one;
-  }
-  const double count = static_cast<double>(n), mean = sum / count;
-  const double variance = n > 1 ? std::max(0.0, squares - count * mean * mean) / (count - 1.0) : HUGE_VAL;
-  return {mean, std::sqrt(variance / count)};
-}
-
 std::vector<ModelScore> scoreModels(const std::vector<Observed>& views, const Bundle& start,
                                     int folds) {
   const std::size_t coordinates = coordinatesOf(views);

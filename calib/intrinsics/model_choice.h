@@ -3,7 +3,8 @@
 
 #include <vector>
 
-#include "calib/intrinsics/estimate.h"
+#include "calib/intrinsics/bundle.h"
+#include "calib/intrinsics/target.h"
 
 namespace toftwin::intrinsics {
 

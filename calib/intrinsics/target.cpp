@@ -7,7 +7,7 @@
 #include <optional>
 #include <utility>
 
-#include "calib/intrinsics/markers.h"
+#include "calib/intrinsics/dictionary.h"
 
 namespace toftwin::intrinsics {
 namespace {

@@ -40,11 +40,6 @@ Eigen::VectorXd resampled(const std::vector<SharedInformation>& views,
 
 }  // namespace
 
-double studentQuantile(double degrees) {
-  const double z = kNormal95, z3 = z * z * z, z5 = z3 * z * z;
-  return z + (z3 + z) / (4.0 * degrees) + (5.0 * z5 + 16.0 * z3 + 3.0 * z) / (96.0 * degrees * degrees);
-}
-
 LensUncertainty uncertaintyOf(const std::vector<Observed>& views, const Bundle& bundle, int resamples,
                               std::uint64_t seed) {
   const auto information = sharedInformation(views, bundle);

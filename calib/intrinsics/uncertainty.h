@@ -19,9 +19,6 @@ struct LensUncertainty {
   double clustering = 1.0;           ///< root mean square of from_views / from_corners
 };
 
-/// 97.5 % of Student's t lie below: the Cornish-Fisher expansion, right to 0.5 % from 4 degrees on.
-double studentQuantile(double degrees);
-
 /// Views are resampled `resamples` times, by one Gauss-Newton step each (docs/calibrate.md).
 LensUncertainty uncertaintyOf(const std::vector<Observed>& views,
                               const Bundle& bundle, int resamples = 1000, std::uint64_t seed = 1);

@@ -10,6 +10,7 @@
 #include <toftwin/geometry.h>
 #include <toftwin/result.h>
 
+#include "calib/plan/place.h"
 #include "calib/plan/plan.h"
 
 namespace toftwin::plan {
@@ -49,9 +50,5 @@ Result<Schedule> scheduleOf(const Plan& plan, const Tempo& tempo = {});
 
 /// How one thing goes with another: Pearson's correlation; 0 where one of them does not change.
 double correlation(const std::vector<double>& x, const std::vector<double>& y);
-
-/// The poses of a block, in the order written: those of the file, or at its distances and angles from the
-/// target, looking at it.
-std::vector<compare::PoseSpec> posesOf(const Plan& plan, const BlockSpec& block);
 
 }  // namespace toftwin::plan

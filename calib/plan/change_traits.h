@@ -3,7 +3,7 @@
 
 #include <cstddef>
 
-#include "calib/plan/run_traits.h"
+#include "calib/plan/compared_run.h"
 
 namespace toftwin::plan {
 

@@ -1,4 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
+#include "calib/plan/compare_capture.h"
+
 #include <algorithm>
 #include <cmath>
 
@@ -7,7 +9,7 @@
 
 #include "calib/compare/same_frames.h"
 #include "calib/compare/stack.h"
-#include "calib/plan/compare_run.h"
+#include "calib/plan/seen.h"
 #include "protocol/record/recording.h"
 
 namespace toftwin::plan {

@@ -16,9 +16,11 @@
 #include <fmt/format.h>
 
 #include "calib/plan/captures.h"
+#include "calib/plan/compare_capture.h"
 #include "calib/plan/opened.h"
 #include "calib/plan/run_log.h"
 #include "calib/plan/run_report.h"
+#include "calib/plan/run_traits.h"
 #include "calib/plan/seen.h"
 #include "protocol/record/recording.h"
 #include "protocol/settings/settings.h"

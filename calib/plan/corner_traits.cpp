@@ -11,6 +11,7 @@
 
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
+#include "calib/plan/seen.h"
 
 namespace toftwin::plan {
 namespace {

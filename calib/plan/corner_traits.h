@@ -4,7 +4,7 @@
 #include <array>
 #include <functional>
 
-#include "calib/plan/run_traits.h"
+#include "calib/plan/compared_run.h"
 
 namespace toftwin::plan {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "calib/plan/run_traits.h"
+#include "calib/plan/compared_run.h"
 
 namespace toftwin::plan {
 

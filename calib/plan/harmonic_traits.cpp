@@ -17,7 +17,6 @@
 #include "calib/compare/characteristics.h"
 #include "calib/compare/gross.h"
 #include "calib/plan/range_steps.h"
-#include "calib/plan/run_traits.h"
 
 namespace toftwin::plan {
 namespace {

@@ -8,7 +8,6 @@
 #include <string>
 #include <utility>
 
-#include "calib/plan/run_traits.h"
 
 namespace toftwin::plan {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "calib/compare/named_traits.h"
-#include "calib/plan/run_report.h"
+#include "calib/plan/compared_run.h"
 
 namespace toftwin::plan {
 

@@ -11,7 +11,7 @@
 #include <fmt/format.h>
 
 #include "calib/compare/json_parse.h"
-#include "calib/plan/compare_run.h"
+#include "calib/plan/compare_capture.h"
 
 namespace toftwin::plan {
 namespace {

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "calib/plan/run_report.h"
+#include "calib/plan/compared_run.h"
 
 namespace toftwin::plan {
 

@@ -7,8 +7,6 @@
 
 #include <fmt/format.h>
 
-#include "calib/plan/captures.h"
-
 namespace toftwin::plan {
 namespace {
 

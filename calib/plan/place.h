@@ -2,6 +2,7 @@
 #pragma once
 
 #include <limits>
+#include <vector>
 
 #include <toftwin/geometry.h>
 
@@ -33,5 +34,9 @@ struct Sight {
   double angle_deg = 0.0;   ///< from the normal
 };
 Sight sightOf(const Target& target, const compare::PoseSpec& pose);
+
+/// The poses of a block, in the order written: those of the file, or at its distances and angles from the
+/// target, looking at it.
+std::vector<compare::PoseSpec> posesOf(const Plan& plan, const BlockSpec& block);
 
 }  // namespace toftwin::plan

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "calib/plan/run_traits.h"
+#include "calib/plan/compared_run.h"
 
 namespace toftwin::plan {
 

@@ -10,7 +10,7 @@
 #include <toftwin/result.h>
 
 #include "calib/plan/run_settings.h"
-#include "calib/plan/run_traits.h"
+#include "calib/plan/compared_run.h"
 
 struct sqlite3;
 

@@ -19,6 +19,7 @@
 #include "calib/compare/verdict_words.h"
 #include "calib/plan/run_figures.h"
 #include "calib/plan/run_traits.h"
+#include "calib/plan/seen.h"
 
 namespace toftwin::plan {
 namespace {

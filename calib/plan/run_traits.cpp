@@ -19,6 +19,7 @@
 #include "calib/plan/missing.h"
 #include "calib/plan/noise_traits.h"
 #include "calib/plan/own_series.h"
+#include "calib/plan/seen.h"
 #include "calib/plan/tilt_traits.h"
 #include "protocol/types/counted.h"
 
@@ -52,25 +53,6 @@ constexpr std::array kFeeds{Feeds{"warm_up", "drift"},
 
 }  // namespace
 
-Captures capturesOf(const ComparedRun& run, std::string_view kind) {
-  Captures chosen;
-  for (const ComparedCapture& one : run.captures) {
-    if (one.pixels > 0 && (kind.empty() || one.record.kind == kind)) chosen.push_back(&one);
-  }
-  return chosen;
-}
-
-Captures allCapturesOf(const ComparedRun& run, std::string_view kind) {
-  Captures chosen;
-  for (const ComparedCapture& one : run.captures) {
-    if (one.record.kind == kind) chosen.push_back(&one);
-  }
-  for (const ComparedCapture& one : run.moving) {
-    if (one.record.kind == kind) chosen.push_back(&one);
-  }
-  return chosen;
-}
-
 namespace {
 
 std::vector<double> column(const Captures& captures,
@@ -92,7 +74,6 @@ std::vector<std::size_t> numbersOf(const Captures& captures) {
 double meanOf(const std::vector<double>& values) {
   return values.empty() ? std::nan("") : compare::summarise(values).mean;
 }
-
 
 /// "at 5 to 60 klx, " where it was in light; empty otherwise.
 std::string lightOf(const Captures& captures) {

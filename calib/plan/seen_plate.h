@@ -1,7 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "calib/plan/seen.h"
+#include <span>
+#include <vector>
+
+#include <toftwin/camera_info.h>
+#include <toftwin/image.h>
+
+#include "calib/compare/stack.h"
+#include "calib/plan/camera_seen.h"
 #include "calib/plan/veil.h"
 
 namespace toftwin::plan {

@@ -9,7 +9,7 @@
 #include "calib/compare/image_slopes.h"
 #include "calib/compare/statistics.h"
 #include "calib/compare/traits/least_squares.h"
-#include "calib/plan/run_traits.h"
+#include "calib/plan/seen.h"
 
 namespace toftwin::plan {
 namespace {

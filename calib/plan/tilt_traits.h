@@ -2,7 +2,7 @@
 #pragma once
 
 #include "calib/compare/named_traits.h"
-#include "calib/plan/compare_run.h"
+#include "calib/plan/compared_run.h"
 
 namespace toftwin::plan {
 

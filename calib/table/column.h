@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "calib/table/number.h"
-#include "calib/table/table.h"
+#include "calib/table/table_column.h"
 
 namespace toftwin::table {
 

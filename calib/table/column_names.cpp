@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "calib/table/layout.h"
+#include "calib/table/look.h"
 #include "calib/table/records.h"
 
 namespace toftwin::table {

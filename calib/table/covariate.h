@@ -7,8 +7,9 @@
 
 #include <toftwin/result.h>
 
-#include "calib/table/readings.h"
+#include "calib/table/nature.h"
 #include "calib/table/table.h"
+#include "calib/table/table_map.h"
 
 namespace toftwin::table {
 

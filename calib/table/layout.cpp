@@ -291,14 +291,6 @@ Error malformedAt(const std::filesystem::path& name, std::size_t line, std::stri
   return {Error::Code::Malformed, fmt::format("{}:{}: {}", name.string(), line, what)};
 }
 
-Look lookOf(std::string_view field) {
-  if (saysNothing(field)) return Look::Nothing;
-  if (signsOf(field) != Signs::NoNumber) return Look::Number;
-  const bool may_be_time = field.find_first_of(":/.- hms") != std::string_view::npos &&
-                           field.find_first_of("0123456789") != std::string_view::npos;
-  return may_be_time && stampIn(field) ? Look::Time : Look::Text;
-}
-
 Result<Layout> layoutOf(const Records& records, char delimiter, const std::filesystem::path& name) {
   return Finder{records, delimiter, name}.find();
 }

@@ -10,18 +10,13 @@
 
 #include <toftwin/result.h>
 
+#include "calib/table/look.h"
 #include "calib/table/records.h"
 
 namespace toftwin::table {
 
 /// "table.csv:12: has 3 fields …".
 Error malformedAt(const std::filesystem::path& name, std::size_t line, std::string_view what);
-
-/// What one field looks like, before it is known what its column holds.
-enum class Look { Nothing, Number, Time, Text };
-Look lookOf(std::string_view field);
-
-inline bool isValue(Look look) { return look == Look::Number || look == Look::Time; }
 
 /// What is looked at to know how a table is laid out.
 constexpr std::size_t kSampledRecords = 300;

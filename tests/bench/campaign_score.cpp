@@ -15,10 +15,10 @@
 #include <toftwin/nan.h>
 
 #include "calib/compare/statistics.h"
-#include "calib/discover/campaign/catalogue.h"
-#include "calib/discover/campaign/covariates.h"
-#include "calib/discover/campaign/refit.h"
-#include "calib/discover/campaign/unequal_exposures.h"
+#include "calib/discover/campaign/captures/catalogue.h"
+#include "calib/discover/campaign/rows/covariates.h"
+#include "calib/discover/campaign/rows/refit.h"
+#include "calib/discover/campaign/rows/unequal_exposures.h"
 
 namespace toftwin::discover::bench {
 namespace {

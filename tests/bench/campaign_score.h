@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/discover/campaign/discover_campaign.h"
+#include "calib/discover/campaign/answer/discover_campaign.h"
 #include "tests/bench/campaign_truth.h"
 
 /// How right a search of a campaign was, as a line of comma-separated values, and such lines as a table.

@@ -7,9 +7,10 @@
 
 #include <toftwin/nan.h>
 
-#include "calib/discover/campaign/carriers.h"
-#include "calib/discover/campaign/reading.h"
-#include "calib/discover/campaign/rows.h"
+#include "calib/discover/campaign/captures/light_delay.h"
+#include "calib/discover/campaign/captures/reading.h"
+#include "calib/discover/campaign/rows/carriers.h"
+#include "calib/discover/campaign/rows/rows.h"
 #include "calib/discover/marginal.h"
 
 namespace toftwin::discover::bench {

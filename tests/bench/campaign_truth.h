@@ -5,8 +5,8 @@
 #include <memory>
 #include <vector>
 
-#include "calib/discover/campaign/campaign.h"
-#include "calib/discover/campaign/discover_campaign.h"
+#include "calib/discover/campaign/answer/discover_campaign.h"
+#include "calib/discover/campaign/captures/campaign.h"
 
 /// What only one knows who hid the effect: a benchmark simulates the same captures free of noise, with the
 /// truth and with what was found.

@@ -35,10 +35,10 @@
 
 #include <toftwin/nan.h>
 
-#include "calib/discover/campaign/discover_campaign.h"
-#include "calib/discover/campaign/model_file.h"
-#include "calib/discover/campaign/reading.h"
-#include "calib/discover/campaign/refit.h"
+#include "calib/discover/campaign/answer/discover_campaign.h"
+#include "calib/discover/campaign/captures/reading.h"
+#include "calib/discover/campaign/rows/refit.h"
+#include "calib/discover/campaign/search/model_file.h"
 #include "calib/plan/opened.h"
 #include "tests/bench/campaign_score.h"
 #include "tests/bench/campaign_truth.h"

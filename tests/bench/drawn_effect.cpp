@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/discover/campaign/effect_numbers.h"
+#include "calib/discover/campaign/captures/effect_numbers.h"
 
 namespace toftwin::discover::bench {
 namespace {

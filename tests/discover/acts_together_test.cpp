@@ -5,7 +5,7 @@
 
 #include <gmock/gmock.h>
 
-#include "calib/discover/campaign/temperature_rates.h"
+#include "calib/discover/campaign/captures/temperature_rates.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {

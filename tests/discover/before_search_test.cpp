@@ -8,8 +8,8 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "calib/discover/campaign/before_search.h"
-#include "calib/discover/campaign/gather_capture.h"
+#include "calib/discover/campaign/answer/before_search.h"
+#include "calib/discover/campaign/captures/gather_capture.h"
 #include "calib/plan/opened.h"
 #include "protocol/record/recording.h"
 #include "tests/discover/searched.h"

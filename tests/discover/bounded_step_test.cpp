@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calib/discover/campaign/bounded_step.h"
+#include "calib/discover/campaign/rows/bounded_step.h"
 
 #include <gtest/gtest.h>
 

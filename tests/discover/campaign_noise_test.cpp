@@ -7,10 +7,10 @@
 #include <numbers>
 #include <random>
 
-#include "calib/discover/campaign/gather_capture.h"
-#include "calib/discover/campaign/light_noise.h"
-#include "calib/discover/campaign/rows.h"
-#include "calib/discover/campaign/reading.h"
+#include "calib/discover/campaign/captures/gather_capture.h"
+#include "calib/discover/campaign/captures/light_noise.h"
+#include "calib/discover/campaign/captures/reading.h"
+#include "calib/discover/campaign/rows/rows.h"
 #include "sim/decode/decode_steps.h"
 #include "sim/sensor/factory_calibration.h"
 #include "sim/sensor/waveform.h"

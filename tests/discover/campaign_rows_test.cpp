@@ -11,13 +11,14 @@
 #include <numbers>
 #include <set>
 
-#include "calib/discover/campaign/carriers.h"
-#include "calib/discover/campaign/catalogue.h"
-#include "calib/discover/campaign/discover_campaign.h"
-#include "calib/discover/campaign/model_file.h"
-#include "calib/discover/campaign/refit.h"
-#include "calib/discover/campaign/rows.h"
-#include "calib/discover/campaign/sites.h"
+#include "calib/discover/campaign/answer/discover_campaign.h"
+#include "calib/discover/campaign/captures/catalogue.h"
+#include "calib/discover/campaign/captures/light_delay.h"
+#include "calib/discover/campaign/captures/sites.h"
+#include "calib/discover/campaign/rows/carriers.h"
+#include "calib/discover/campaign/rows/refit.h"
+#include "calib/discover/campaign/rows/rows.h"
+#include "calib/discover/campaign/search/model_file.h"
 #include "calib/discover/marginal.h"
 #include "calib/discover/significance.h"
 #include "tests/discover/simulated_run.h"

@@ -6,7 +6,7 @@
 
 #include <gmock/gmock.h>
 
-#include "calib/discover/campaign/pose_errors.h"
+#include "calib/discover/campaign/rows/pose_errors.h"
 #include "calib/plan/opened.h"
 #include "tests/discover/searched.h"
 

@@ -7,8 +7,8 @@
 
 #include <gmock/gmock.h>
 
-#include "calib/discover/campaign/campaign_json.h"
-#include "calib/discover/campaign/frames_apart.h"
+#include "calib/discover/campaign/answer/campaign_json.h"
+#include "calib/discover/campaign/search/frames_apart.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {

@@ -7,8 +7,8 @@
 
 #include <gmock/gmock.h>
 
-#include "calib/discover/campaign/frames_apart.h"
-#include "calib/discover/campaign/frames_beat.h"
+#include "calib/discover/campaign/search/frames_apart.h"
+#include "calib/discover/campaign/search/frames_beat.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calib/discover/campaign/judged_regions.h"
+#include "calib/discover/campaign/answer/judged_regions.h"
 
 #include <cmath>
 

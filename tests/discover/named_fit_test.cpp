@@ -8,9 +8,9 @@
 #include <cmath>
 #include <filesystem>
 
-#include "calib/discover/campaign/catalogue.h"
-#include "calib/discover/campaign/discover_campaign.h"
-#include "calib/discover/campaign/rows.h"
+#include "calib/discover/campaign/answer/discover_campaign.h"
+#include "calib/discover/campaign/captures/catalogue.h"
+#include "calib/discover/campaign/rows/rows.h"
 #include "calib/plan/opened.h"
 #include "tests/discover/searched.h"
 

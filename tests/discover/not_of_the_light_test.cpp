@@ -8,9 +8,9 @@
 #include <gmock/gmock.h>
 #include <toftwin/nan.h>
 
-#include "calib/discover/campaign/pose_errors.h"
-#include "calib/discover/campaign/smeared_ranges.h"
-#include "calib/discover/campaign/spilled_light.h"
+#include "calib/discover/campaign/rows/pose_errors.h"
+#include "calib/discover/campaign/rows/smeared_ranges.h"
+#include "calib/discover/campaign/rows/spilled_light.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How noisy a pixel is, pixels that are alike tell together; which are alike its own noise must not say.
-#include "calib/discover/campaign/pool_noise.h"
+#include "calib/discover/campaign/captures/pool_noise.h"
 
 #include <cmath>
 #include <random>
@@ -9,7 +9,7 @@
 #include <gtest/gtest.h>
 #include <toftwin/nan.h>
 
-#include "calib/discover/campaign/reading.h"
+#include "calib/discover/campaign/captures/reading.h"
 #include "tests/discover/simulated_run.h"
 
 namespace toftwin::discover {

@@ -6,7 +6,7 @@
 #include <numbers>
 #include <vector>
 
-#include "calib/discover/campaign/raw_exposures.h"
+#include "calib/discover/campaign/captures/raw_exposures.h"
 #include "sim/images/box_mean.h"
 #include "tests/discover/searched.h"
 

@@ -9,7 +9,7 @@
 #include <filesystem>
 #include <fstream>
 
-#include "calib/discover/campaign/discover_campaign.h"
+#include "calib/discover/campaign/answer/discover_campaign.h"
 #include "protocol/record/recording.h"
 #include "tests/discover/simulated_run.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <random>
 
-#include "calib/discover/campaign/removed_share.h"
+#include "calib/discover/campaign/answer/removed_share.h"
 
 namespace toftwin::discover {
 namespace {

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <random>
 
-#include "calib/discover/campaign/sample_steps.h"
+#include "calib/discover/campaign/captures/sample_steps.h"
 
 namespace toftwin::discover {
 namespace {

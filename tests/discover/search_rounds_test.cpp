@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What each round of a search looks at.
-#include "calib/discover/campaign/search_rounds.h"
+#include "calib/discover/campaign/search/search_rounds.h"
 
 #include <gmock/gmock.h>
 

@@ -11,7 +11,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
-#include "calib/discover/campaign/discover_campaign.h"
+#include "calib/discover/campaign/answer/discover_campaign.h"
 #include "tests/discover/simulated_run.h"
 
 namespace toftwin::discover {

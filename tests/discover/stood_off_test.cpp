@@ -5,8 +5,8 @@
 #include <cmath>
 #include <random>
 
-#include "calib/discover/campaign/places.h"
-#include "calib/discover/campaign/stood_off.h"
+#include "calib/discover/campaign/search/places.h"
+#include "calib/discover/campaign/search/stood_off.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {

@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "calib/discover/campaign/campaign.h"
+#include "calib/discover/campaign/captures/campaign.h"
 #include "tests/discover/simulated_run.h"
 
 namespace toftwin::discover {

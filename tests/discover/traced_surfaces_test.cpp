@@ -5,7 +5,7 @@
 #include <numeric>
 #include <stdexcept>
 
-#include "calib/discover/campaign/campaign.h"
+#include "calib/discover/campaign/captures/campaign.h"
 #include "tests/discover/simulated_run.h"
 
 namespace toftwin::discover {

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "calib/discover/campaign/unequal_exposures.h"
+#include "calib/discover/campaign/rows/unequal_exposures.h"
 
 #include <gmock/gmock.h>
 
@@ -12,7 +12,7 @@
 
 #include <Eigen/Dense>
 
-#include "calib/discover/campaign/model_file.h"
+#include "calib/discover/campaign/search/model_file.h"
 #include "tests/discover/searched.h"
 
 namespace toftwin::discover {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 
+#include "calib/plan/run_report.h"
 #include "calib/plan/run_traits.h"
 
 namespace toftwin::plan {

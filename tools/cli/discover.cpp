@@ -7,7 +7,7 @@
 #include <string>
 #include <system_error>
 
-#include "calib/discover/campaign/before_search.h"
+#include "calib/discover/campaign/answer/before_search.h"
 #include "calib/loop/answer.h"
 #include "calib/loop/camera.h"
 #include "calib/loop/discover.h"

@@ -3,7 +3,7 @@
 
 #include <fmt/format.h>
 
-#include "calib/discover/campaign/discover_campaign.h"
+#include "calib/discover/campaign/answer/discover_campaign.h"
 #include "sim/effects/effects.h"
 
 namespace toftwin::cli {

@@ -8,12 +8,10 @@
 #include <string>
 #include <vector>
 
+#include "calib/compare/traits/model.h"
 #include "calib/compare/traits/traits.h"
 
 namespace toftwin::compare {
-
-/// What a model with parameters p says of a row.
-using Model = std::function<double(std::span<const double> p, std::size_t row)>;
 
 /// Parameters p that minimise Σ (y − model)², with their covariance s² (JᵀJ)⁻¹, s² = Σ(…)²/(n − k).
 struct Fit {

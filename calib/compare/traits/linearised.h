@@ -6,7 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "calib/compare/traits/least_squares.h"
+#include "calib/compare/traits/model.h"
+#include "calib/compare/traits/traits.h"
 
 namespace toftwin::compare {
 
