@@ -53,6 +53,7 @@ struct SourceVariable {
 };
 constexpr SourceVariable kIntegrationTime{"integrationTimeUs", "exposure_us"};
 constexpr std::string_view kFramePeriod = "framePeriodUs", kFrameRate = "frame_rate_hz";
+constexpr std::string_view kTemperatureMargin = "SysTemperatureWarningMargin";
 constexpr double kPerSecond_us = 1e6;
 
 }  // namespace
@@ -109,6 +110,7 @@ Device::Told Device::stateVariable(std::string_view name) const {
   if (name == "illuminationActive") return Writer{}.flag(mode_ != FrontendMode::Stop).bytes();
   const auto tenths = static_cast<std::int16_t>(std::lround(10.0 * std::clamp(facts_.temperature_c, -300.0, 3000.0)));
   if (name == "SysTemperatureCurrentValue") return Writer{}.number(tenths).bytes();
+  if (name == kTemperatureMargin) return Writer{}.number(temperature_margin_c_).bytes();
   // Lists, with how many they have before them.
   if (name == "TemperatureNames") return Writer{}.number(std::uint16_t{1}).text("system").bytes();
   if (name == "TemperatureValues") return Writer{}.number(std::uint16_t{1}).number(tenths).bytes();
@@ -167,7 +169,14 @@ std::optional<Device::Outcome> Device::writeSource(const ColaCommand& command) c
 Device::Outcome Device::write(const ColaCommand& command, const Client& client) {
   const bool is_there = identityVariable(command.name) || stateVariable(command.name) || sourceVariable(command.name);
   if (!is_there) return refused(ColaError::UnknownVariable);
-  if (client.level < UserLevel::Maintenance) return refused(ColaError::WriteDenied);
+  const auto needed = command.name == kTemperatureMargin ? UserLevel::Service : UserLevel::Maintenance;
+  if (client.level < needed) return refused(ColaError::WriteDenied);
+  if (command.name == kTemperatureMargin) {
+    const auto margin = Reader{command.params}.number<std::int16_t>();
+    if (!margin) return refused(ColaError::TooShort);
+    temperature_margin_c_ = *margin;
+    return done(command);
+  }
   if (auto outcome = writeSource(command)) return *std::move(outcome);
   if (const auto error = writeSwitch(command))
     return refused(*error == ColaError::UnknownVariable ? ColaError::WriteDenied : *error);

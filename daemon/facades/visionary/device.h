@@ -81,6 +81,8 @@ class Device {
   SourceFacts facts_;
   FrontendMode mode_ = FrontendMode::Continuous;
   bool masks_depth_ = true;
+  /// How far below the limit a real camera warns; kept for who reads it back.
+  std::int16_t temperature_margin_c_ = 5;
   std::map<std::string, std::uint8_t, std::less<>> functions_{{"DIO1Fnc", 0}, {"DIO2Fnc", 0}};
 };
 

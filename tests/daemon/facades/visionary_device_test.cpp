@@ -190,6 +190,17 @@ TEST_F(VisionaryDevice, OnlyWhoIsLoggedInWrites) {
   EXPECT_EQ(errorOf(ask(Kind::Write, "enDepthMask", Writer{}.flag(true).bytes())), ColaError::WriteDenied);
 }
 
+TEST_F(VisionaryDevice, TheTemperatureMarginIsForServiceToSet) {
+  constexpr auto kName = "SysTemperatureWarningMargin";
+  const Bytes wanted = Writer{}.number(std::int16_t{-7}).bytes();
+  EXPECT_EQ(logIn("CLIENT", true), 0);
+  EXPECT_EQ(errorOf(ask(Kind::Write, kName, wanted)), ColaError::WriteDenied);
+  client_.level = UserLevel::Service;
+  EXPECT_EQ(errorOf(ask(Kind::Write, kName, bytesOf({1}))), ColaError::TooShort);
+  EXPECT_EQ(errorOf(ask(Kind::Write, kName, wanted)), ColaError{0});
+  EXPECT_EQ(toldOf(ask(Kind::Read, kName)), wanted);
+}
+
 TEST_F(VisionaryDevice, LoginsOfBothKindsNeedThePassword) {
   EXPECT_EQ(logIn("CLIENT", true), 0);
   EXPECT_EQ(logIn("wrong", true), 2);
