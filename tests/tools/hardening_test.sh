@@ -53,7 +53,7 @@ check() {
   must "$1" "stack that cannot be run" "$(readelf -lW "$1" | grep GNU_STACK)" 'RW +0x'
 }
 check "$folder/small"
-for program in daemon/toftwind tools/toftwin; do
-  if [ -x "$source/build/release/$program" ]; then check "$source/build/release/$program"; fi
+for program in {release,package}/{daemon/toftwind,tools/toftwin}; do
+  if [ -x "$source/build/$program" ]; then check "$source/build/$program"; fi
 done
 exit $bad

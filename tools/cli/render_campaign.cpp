@@ -172,16 +172,16 @@ Result<Job> jobOf(const RenderOptions& options) {
   auto scene = loadScene(options.scene);
   if (!scene) return scene.error();
   if (const auto missing = sim::missingLight(*scene, model->traceRequest().emitters, false))
-    fmt::print(stderr, "toftwin: {}: warning: {}\n", options.scene, *missing);
-  for (const std::string& note : model->notes()) fmt::print(stderr, "toftwin: note: {}\n", note);
+    options.tell(fmt::format("{}: warning: {}", options.scene, *missing));
+  for (const std::string& note : model->notes()) options.tell("note: " + note);
   if (const auto off_axis = sim::lensOffAxis(model->camera()))
-    fmt::print(stderr, "toftwin: {}: warning: {}\n", options.camera, *off_axis);
+    options.tell(fmt::format("{}: warning: {}", options.camera, *off_axis));
   const auto pose = options.pose.pose();
   if (!pose) return pose.error();
-  const auto warn = [&](const std::string& text) { fmt::print(stderr, "toftwin: {}: warning: {}\n", options.scene, text); };
+  const auto warn = [&](const std::string& text) { options.tell(fmt::format("{}: warning: {}", options.scene, text)); };
   for (const std::string& note : scene->notes()) warn(note);
-  auto trajectory =
-      options.trajectory.empty() ? Result<Trajectory>{Trajectory{}} : loadTrajectory(options.trajectory);
+  auto trajectory = options.trajectory.empty() ? Result<Trajectory>{options.poses.value_or(Trajectory{})}
+                                               : loadTrajectory(options.trajectory);
   if (!trajectory) return trajectory.error();
   const auto nothing = sim::seesNothing(*scene, model->camera(), trajectory->poses.empty() ? *pose : firstPose(*trajectory));
   if (nothing) warn(*nothing);

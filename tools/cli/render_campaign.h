@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,6 +27,7 @@ struct RenderOptions {
   std::string scene;
   std::string camera;
   std::string trajectory;
+  std::optional<Trajectory> poses{};  ///< instead of that file
   std::uint64_t frames = 0;
   double frame_interval_ms = 0.0;  ///< 0: the camera's own
   std::vector<std::string> format_names;
@@ -33,6 +39,8 @@ struct RenderOptions {
   RenderSettings settings{.since_power_on_s = drivers::simulator::Keys{}.powered_on_before.in(second),
                           .ambient_klx = drivers::simulator::Keys{}.ambient.in(kilolux),
                           .room_temperature_c = drivers::simulator::Keys{}.room_temperature.in(celsius)};
+  /// Gets what a person should know of camera and scene: each with the file that it is of.
+  std::function<void(const std::string&)> tell = [](const std::string& text) { fmt::print(stderr, "toftwin: {}\n", text); };
 };
 
 Target targetOf(const RenderOptions& options);

@@ -7,6 +7,8 @@ set(package_folder ${CMAKE_INSTALL_LIBDIR}/cmake/toftwin)
 install(TARGETS toftwin_types toftwin_wire toftwin_transport toftwin_client EXPORT toftwinTargets
         ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development
         LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT development)
+install(TARGETS toftwin_shared EXPORT toftwinTargets
+        LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR} COMPONENT client NAMELINK_COMPONENT development)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/protocol/include/toftwin
                   ${PROJECT_SOURCE_DIR}/protocol/client/include/toftwin
         DESTINATION include COMPONENT development FILES_MATCHING PATTERN "*.h")
