@@ -25,7 +25,7 @@ if [ -n "$left" ]; then echo "in no package, as their component is none of CPACK
 # The lists are of a build with all that is optional; of one with less only what it has.
 grep -E "^($(tr '\n' '|' <<<"$components" | sed 's/|$//')) " "$source/tests/tools/packages/contents.txt" >"$folder/wanted" || true
 if ! diff "$folder/wanted" "$folder/found"; then echo "tests/tools/packages/contents.txt (<) is not what the packages have (>)"; bad=1; fi
-for script in postinst prerm postrm; do sh -n "$source/systemd/debian/$script" || bad=1; done
+for script in "$source"/systemd/debian/{postinst,prerm,postrm} "$source"/tools/debian/python/*; do sh -n "$script" || bad=1; done
 while read -r file; do
   [ "$file" = /etc/toftwin/toftwind.toml ] || { echo "conffiles has $file"; bad=1; }
 done <"$source/systemd/debian/conffiles"

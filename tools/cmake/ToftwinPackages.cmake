@@ -123,7 +123,7 @@ if(TOFTWIN_HAS_PYTHON)
     SYNOPSIS "time-of-flight cameras, real and simulated, as NumPy arrays"
     TEXT "${of_one}\n\nThis package has a module for Python 3: a client, recordings, the simulator, discovery and correction."
     DEPENDS ${common} "python3 (>= ${TOFTWIN_PYTHON_VERSION})" "python3 (<< ${TOFTWIN_PYTHON_VERSION}.99)" python3-numpy
-    RECOMMENDS toftwin-meshes)
+    RECOMMENDS toftwin-meshes CONTROL ${debian}/python/postinst ${debian}/python/prerm)
 endif()
 
 # What of others is in the programs; tools/package has it made before it packs.
