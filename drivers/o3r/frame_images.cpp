@@ -28,7 +28,8 @@ using toftwin::o3r::TofInfo;
 constexpr auto kInvalidFlag = static_cast<unsigned>(PixelFlag::Invalid);
 
 /// Copied, because chunks lie anywhere; a byte each of older firmware's confidence.
-Result<std::vector<std::uint16_t>> countsOf(const FrameContent& content, ChunkType type, const Image<float>& like) {
+Result<std::vector<std::uint16_t>> countsOf(const FrameContent& content, ChunkType type,
+                                            const Image<float>& like) {
   const Chunk* chunk = content.find(type);
   const auto pixels = like.size();
   const bool is_small = chunk != nullptr && chunk->header.format == ElementFormat::U8;
@@ -37,8 +38,9 @@ Result<std::vector<std::uint16_t>> countsOf(const FrameContent& content, ChunkTy
                         (is_small || chunk->header.format == ElementFormat::U16) &&
                         chunk->data.size() >= pixels * sizeOf(chunk->header.format);
   if (!is_image) {
-    return Error{Error::Code::Malformed, fmt::format("o3r: the frame has no chunk {} of {} x {} pixels",
-                                                     static_cast<std::uint32_t>(type), like.width(), like.height())};
+    return Error{Error::Code::Malformed,
+                 fmt::format("o3r: the frame has no chunk {} of {} x {} pixels",
+                             static_cast<std::uint32_t>(type), like.width(), like.height())};
   }
   std::vector<std::uint16_t> counts(pixels);
   for (std::size_t i = 0; i < pixels; ++i) {
@@ -92,8 +94,12 @@ Result<Optics> opticsOf(const TofInfo& info, int width, int height) {
   const bool is_ours = info.inverse_intrinsics.model == 1 && p[0] > 0.0F && p[1] > 0.0F && p[4] == 0.0F;
   if (is_ours) {
     const auto number = [&](std::size_t i) { return static_cast<double>(p[i]); };
-    const CameraInfo camera{.width = width, .height = height, .fx = number(0), .fy = number(1),
-                            .cx = number(2) - kHalf, .cy = number(3) - kHalf,
+    const CameraInfo camera{.width = width,
+                            .height = height,
+                            .fx = number(0),
+                            .fy = number(1),
+                            .cx = number(2) - kHalf,
+                            .cy = number(3) - kHalf,
                             .distortion = {number(5), number(6), number(7), number(8), number(9)},
                             .calibration_id = {}};
     return Optics{camera, depthPerRange(camera)};
@@ -115,7 +121,8 @@ Result<std::vector<Plane>> planesOf(const FrameContent& content, const TofInfo& 
   const auto confidence = countsOf(content, ChunkType::Confidence, per_range);
   if (!confidence) return confidence.error();
   const auto size = [&] { return std::pair{per_range.width(), per_range.height()}; }();
-  Image<float> range_m{size.first, size.second}, depth_m{size.first, size.second}, strength{size.first, size.second};
+  Image<float> range_m{size.first, size.second}, depth_m{size.first, size.second},
+      strength{size.first, size.second};
   Image<std::uint8_t> flags{size.first, size.second}, exposure{size.first, size.second};
   for (std::size_t i = 0; i < per_range.size(); ++i) {
     unsigned flag = toftwin::o3r::flagsOf((*confidence)[i]);

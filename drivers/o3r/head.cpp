@@ -35,7 +35,8 @@ Result<Head> readHead(std::string_view json, const std::string& port) {
   const Json tree = parsed(json);
   const Json of = tree.is_object() ? tree.value(Json::json_pointer{"/ports/" + port}, Json{}) : Json{};
   if (!of.is_object())
-    return Error{Error::Code::NotFound, fmt::format("o3r: the unit has no head at {}; see `toftwin compliance`", port)};
+    return Error{Error::Code::NotFound,
+                 fmt::format("o3r: the unit has no head at {}; see `toftwin compliance`", port)};
   Head head{.type = textAt(of, "/info/features/type"),
             .part_number = textAt(of, "/info/partNumber"),
             .serial = textAt(of, "/info/serialNumber"),
@@ -45,10 +46,12 @@ Result<Head> readHead(std::string_view json, const std::string& port) {
   const Json pcic = of.value(Json::json_pointer{"/data/pcicTCPPort"}, Json{});
   if (pcic.is_number_unsigned() && pcic.get<std::uint64_t>() <= 65'535) head.pcic_port = pcic.get<int>();
   if (head.type != "3D") {
-    return Error{Error::Code::Incompatible,
-                 fmt::format("o3r: the head at {} is of type \"{}\"; frames come from 3D heads", port, head.type)};
+    return Error{
+        Error::Code::Incompatible,
+        fmt::format("o3r: the head at {} is of type \"{}\"; frames come from 3D heads", port, head.type)};
   }
-  if (head.pcic_port == 0) return Error{Error::Code::Incompatible, fmt::format("o3r: {} has no pcicTCPPort", port)};
+  if (head.pcic_port == 0)
+    return Error{Error::Code::Incompatible, fmt::format("o3r: {} has no pcicTCPPort", port)};
   const Json acquisition = of.value("acquisition", Json::object());
   for (const auto& [name, value] : acquisition.items()) {
     if (value.is_number()) head.acquisition.emplace(name, value.get<double>());
@@ -85,10 +88,11 @@ Result<HeadAddress> readAddress(std::string_view uri) {
   }
   address.host = text;
   if (is_good && !text.empty()) return address;
-  return Error{Error::Code::NotFound,
-               fmt::format("there is no head {}; write o3r:, the unit's IP address and the head's port, such as "
-                           "o3r:192.168.0.69/port2",
-                           uri)};
+  return Error{
+      Error::Code::NotFound,
+      fmt::format("there is no head {}; write o3r:, the unit's IP address and the head's port, such as "
+                  "o3r:192.168.0.69/port2",
+                  uri)};
 }
 
 }  // namespace toftwin::drivers::o3r

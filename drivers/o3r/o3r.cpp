@@ -57,7 +57,8 @@ Result<Head> askHead(Rpc& rpc, const std::string& port) {
 }
 
 /// Set to what is wanted, and read anew.
-Result<Head> setHead(Rpc& rpc, const std::string& port, const std::map<std::string, double, std::less<>>& wanted) {
+Result<Head> setHead(Rpc& rpc, const std::string& port,
+                     const std::map<std::string, double, std::less<>>& wanted) {
   auto head = askHead(rpc, port);
   if (!head) return head;
   const std::string settings = settingsFor(*head, port, wanted);
@@ -68,7 +69,8 @@ Result<Head> setHead(Rpc& rpc, const std::string& port, const std::map<std::stri
 
 class O3rSource final : public Source {
  public:
-  O3rSource(std::unique_ptr<EventLoop> loop, Endpoint xmlrpc, HeadAddress address, Keys keys, Head head, Optics optics)
+  O3rSource(std::unique_ptr<EventLoop> loop, Endpoint xmlrpc, HeadAddress address, Keys keys, Head head,
+            Optics optics)
       : loop_(std::move(loop)),
         rpc_(*loop_, xmlrpc, kName),
         pcic_(xmlrpc.address(), static_cast<std::uint16_t>(head.pcic_port)),
@@ -119,7 +121,8 @@ class O3rSource final : public Source {
     for (const Adjustable& one : kHeadAdjustables) {
       const auto found = head_.acquisition.find(one.place);
       if (found != head_.acquisition.end())
-        state.parameters.push_back({.name = std::string{one.name}, .value = found->second, .bounds = one.bounds});
+        state.parameters.push_back(
+            {.name = std::string{one.name}, .value = found->second, .bounds = one.bounds});
     }
     return state;
   }
@@ -127,12 +130,13 @@ class O3rSource final : public Source {
   Result<> setParameter(std::string_view name, double value) override {
     const auto* found = std::ranges::find(kHeadAdjustables, name, &Adjustable::name);
     if (found == kHeadAdjustables.end() || !head_.acquisition.contains(found->place)) {
-      return Error{Error::Code::NotFound, fmt::format("o3r: the head has no parameter \"{}\"; it has: {}", name,
-                                                      fmt::join(info_.parameters, ", "))};
+      return Error{Error::Code::NotFound, fmt::format("o3r: the head has no parameter \"{}\"; it has: {}",
+                                                      name, fmt::join(info_.parameters, ", "))};
     }
     if (!found->bounds.contains(value)) {
-      return Error{Error::Code::InvalidArgument, fmt::format("{} = {} is out of bounds: it must be a number from {} to {}",
-                                                             name, value, found->bounds.min, found->bounds.max)};
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("{} = {} is out of bounds: it must be a number from {} to {}", name, value,
+                               found->bounds.min, found->bounds.max)};
     }
     auto set = setHead(rpc_, address_.port, {{std::string{found->place}, value}});
     if (!set) return set.error();
@@ -156,15 +160,15 @@ class O3rSource final : public Source {
     const auto silent = Clock::now() - since;
     if (silent < std::max<std::chrono::duration<double>>(kLeastSilence, 4.0 * interval))
       return {Error::Code::Timeout, "no frame within a second"};
-    return {Error::Code::Disconnected,
-            fmt::format("o3r: {}/{}: the line is up, but no frame has come for {} ms; the head hangs, or another program set "
-                        "its state to CONF or IDLE",
-                        pcic_.address().to_string(), address_.port,
-                        std::chrono::duration_cast<milliseconds>(silent).count())};
+    return {Error::Code::Disconnected, fmt::format("o3r: {}/{}: the line is up, but no frame has come for {} "
+                                                   "ms; the head hangs, or another program set "
+                                                   "its state to CONF or IDLE",
+                                                   pcic_.address().to_string(), address_.port,
+                                                   std::chrono::duration_cast<milliseconds>(silent).count())};
   }
 
-  /// A frame that cannot be read is counted as lost: Malformed. Many in a row: Disconnected, so that the head is opened
-  /// anew.
+  /// A frame that cannot be read is counted as lost: Malformed. Many in a row: Disconnected, so that the head
+  /// is opened anew.
   Result<Frame> toFrame(const PcicStream::Message& message) {
     const auto content = toftwin::o3d303::readFrameContent(message.message.content);
     if (!content) return badFrame(content.error());
@@ -242,13 +246,14 @@ Result<Optics> readOptics(EventLoop& loop, const Endpoint& pcic, milliseconds wi
   using namespace toftwin::o3r;
   const auto deadline = Clock::now() + within;
   PcicStream stream{loop, kName};
-  if (auto opened = stream.open(pcic, schemaOf({kConfidenceBlob, kTofInfoBlob})); !opened) return opened.error();
+  if (auto opened = stream.open(pcic, schemaOf({kConfidenceBlob, kTofInfoBlob})); !opened)
+    return opened.error();
   while (true) {
     auto message = stream.next(deadline, {});
     if (!message && message.error().code == Error::Code::Timeout) {
       return Error{Error::Code::Disconnected,
-                   fmt::format("o3r: {}: no frame within {} ms; is the head plugged in?", pcic.address().to_string(),
-                               within.count())};
+                   fmt::format("o3r: {}: no frame within {} ms; is the head plugged in?",
+                               pcic.address().to_string(), within.count())};
     }
     if (!message) return message.error();
     if (message->message.ticket != toftwin::o3d303::kFrameTicket) continue;
@@ -259,9 +264,11 @@ Result<Optics> readOptics(EventLoop& loop, const Endpoint& pcic, milliseconds wi
     const auto pixels = [](const auto& header) { return std::uint64_t{header.width} * header.height; };
     const bool has_size = confidence != nullptr && confidence->data.size() >= pixels(confidence->header);
     if (!has_size || !info) {
-      return Error{Error::Code::Incompatible, "o3r: the head sends no confidence image with TOF_INFO; update its firmware"};
+      return Error{Error::Code::Incompatible,
+                   "o3r: the head sends no confidence image with TOF_INFO; update its firmware"};
     }
-    return opticsOf(*info, static_cast<int>(confidence->header.width), static_cast<int>(confidence->header.height));
+    return opticsOf(*info, static_cast<int>(confidence->header.width),
+                    static_cast<int>(confidence->header.height));
   }
 }
 
@@ -269,7 +276,8 @@ Result<std::unique_ptr<Source>> openHead(const Endpoint& xmlrpc, HeadAddress add
                                          const std::optional<CameraInfo>& calibrated) {
   auto loop = std::make_unique<EventLoop>();
   Rpc rpc{*loop, xmlrpc, kName};
-  if (auto alive = rpc.call("", "getParameter", {"DeviceType"}, {}, o3d303::kFirstAnswerTime); !alive) return alive.error();
+  if (auto alive = rpc.call("", "getParameter", {"DeviceType"}, {}, o3d303::kFirstAnswerTime); !alive)
+    return alive.error();
   std::map<std::string, double, std::less<>> wanted;
   if (keys.exposure > 0_us) wanted["exposureLong"] = keys.exposure.in(microsecond);
   if (keys.frame_rate > 0_Hz) wanted["framerate"] = keys.frame_rate.in(hertz);
@@ -285,8 +293,8 @@ Result<std::unique_ptr<Source>> openHead(const Endpoint& xmlrpc, HeadAddress add
     if (!lens) return lens.error();
     optics = Optics{lens->camera, depthPerRange(lens->camera)};
   }
-  return std::unique_ptr<Source>{std::make_unique<O3rSource>(std::move(loop), xmlrpc, std::move(address), std::move(keys),
-                                                             *std::move(head), *std::move(optics))};
+  return std::unique_ptr<Source>{std::make_unique<O3rSource>(
+      std::move(loop), xmlrpc, std::move(address), std::move(keys), *std::move(head), *std::move(optics))};
 }
 
 Result<std::unique_ptr<Source>> open(settings::Table& table) {
@@ -295,12 +303,14 @@ Result<std::unique_ptr<Source>> open(settings::Table& table) {
   const auto calibrated = calibrationAt(table, keys.calibration);
   if (auto checked = table.check(); !checked) return checked.error();
   auto address = readAddress(keys.uri);
-  if (!address) return Error{address.error().code, fmt::format("{}: {}", table.place("uri"), address.error().message)};
+  if (!address)
+    return Error{address.error().code, fmt::format("{}: {}", table.place("uri"), address.error().message)};
   boost::system::error_code is_none;
   const auto host = boost::asio::ip::make_address(address->host, is_none);
   if (is_none) {
-    return Error{Error::Code::NotFound, fmt::format("{}: \"{}\" is no IP address; write o3r:192.168.0.69/port2",
-                                                    table.place("uri"), address->host)};
+    return Error{Error::Code::NotFound,
+                 fmt::format("{}: \"{}\" is no IP address; write o3r:192.168.0.69/port2", table.place("uri"),
+                             address->host)};
   }
   const Endpoint xmlrpc{host, address->xmlrpc_port};
   auto opened = openHead(xmlrpc, *std::move(address), std::move(keys), calibrated);

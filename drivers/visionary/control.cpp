@@ -27,11 +27,12 @@ constexpr std::uint8_t kSessionSeconds = 60;
 
 Error refusal(ColaError error, const std::string& name) {
   using Code = Error::Code;
-  const auto code = error == ColaError::WriteDenied || error == ColaError::AccessDenied ? Code::PermissionDenied
-                    : error == ColaError::UnknownVariable || error == ColaError::UnknownMethod
-                        ? Code::NotFound
-                        : Code::InvalidArgument;
-  return {code, fmt::format("visionary: the camera refused \"{}\" (CoLa error {})", name, static_cast<int>(error))};
+  const auto code =
+      error == ColaError::WriteDenied || error == ColaError::AccessDenied        ? Code::PermissionDenied
+      : error == ColaError::UnknownVariable || error == ColaError::UnknownMethod ? Code::NotFound
+                                                                                 : Code::InvalidArgument;
+  return {code,
+          fmt::format("visionary: the camera refused \"{}\" (CoLa error {})", name, static_cast<int>(error))};
 }
 
 }  // namespace
@@ -45,7 +46,8 @@ Result<> Line::connect(const Endpoint& to) {
   name_ = fmt::format("{}:{}", to.address().to_string(), to.port());
   std::optional<error_code> done;
   socket_.async_connect(to, [&](error_code error) { done = error; });
-  if (loop_.waitUntil([&] { return done.has_value(); }, Clock::now() + kConnectTime) != EventLoop::End::Done) {
+  if (loop_.waitUntil([&] { return done.has_value(); }, Clock::now() + kConnectTime) !=
+      EventLoop::End::Done) {
     error_code ignored;
     socket_.close(ignored);
     loop_.waitUntil([&] { return done.has_value(); }, SteadyTime::max());
@@ -67,7 +69,8 @@ void Line::close() {
 
 Result<> Line::send(const Bytes& bytes) {
   std::optional<error_code> sent;
-  boost::asio::async_write(socket_, boost::asio::buffer(bytes), [&](error_code error, std::size_t) { sent = error; });
+  boost::asio::async_write(socket_, boost::asio::buffer(bytes),
+                           [&](error_code error, std::size_t) { sent = error; });
   if (loop_.waitUntil([&] { return sent.has_value(); }, Clock::now() + kAnswerTime) != EventLoop::End::Done) {
     error_code ignored;
     socket_.close(ignored);
@@ -103,7 +106,8 @@ Result<Telegram> Control::exchange(const Bytes& command) {
     if (*telegram) continue;  // of a question that nobody waits for any more
     const auto piece = line_.receive(deadline, {});
     if (!piece && piece.error().code == Error::Code::Timeout)
-      return Error{Error::Code::Disconnected, fmt::format("visionary: no answer within {} ms", kAnswerTime.count())};
+      return Error{Error::Code::Disconnected,
+                   fmt::format("visionary: no answer within {} ms", kAnswerTime.count())};
     if (!piece) return piece.error();
     reader_.feed(*piece);
   }
@@ -114,7 +118,8 @@ Result<> Control::open() {
   if (auto connected = line_.connect(camera_); !connected) return connected;
   reader_ = toftwin::visionary::TelegramReader{1 << 20};
   session_ = 0;
-  const ColaCommand asked{.kind = Kind::Open, .name = {}, .params = Writer{}.number(kSessionSeconds).text("toftwin").bytes()};
+  const ColaCommand asked{
+      .kind = Kind::Open, .name = {}, .params = Writer{}.number(kSessionSeconds).text("toftwin").bytes()};
   auto opened = exchange(askedOf(asked));
   if (!opened) {
     line_.close();
@@ -136,7 +141,8 @@ Result<Bytes> Control::ask(const ColaCommand& command) {
     auto answer = toftwin::visionary::readAnswer(telegram->command, command);
     if (!answer) return Error{Error::Code::Disconnected, "visionary: " + answer.error().message};
     if (!answer->error) return std::move(answer->told);
-    if (*answer->error != ColaError::UnknownSession || attempt > 0) return refusal(*answer->error, command.name);
+    if (*answer->error != ColaError::UnknownSession || attempt > 0)
+      return refusal(*answer->error, command.name);
     line_.close();
   }
 }
@@ -167,14 +173,16 @@ Result<> Control::logIn(std::string_view password) {
   if (numbers.size() < 1 + kSize || numbers[0] != 0)
     return Error{Error::Code::PermissionDenied, "visionary: the camera lets nobody log in now"};
   const std::span all{numbers};
-  const auto salt = numbers.size() >= 1 + 2 * kSize ? all.subspan(1 + kSize, kSize) : std::span<std::uint8_t>{};
+  const auto salt =
+      numbers.size() >= 1 + 2 * kSize ? all.subspan(1 + kSize, kSize) : std::span<std::uint8_t>{};
   Writer writer;
   for (const std::uint8_t one : toftwin::visionary::responseTo(all.subspan(1, kSize), salt, kLevel, password))
     writer.number(one);
   const auto answer = call("SetUserLevel", writer.number(number).bytes());
   if (!answer) return answer.error();
   if (Reader{*answer}.number<std::uint8_t>() == std::uint8_t{0}) return {};
-  return Error{Error::Code::PermissionDenied, "visionary: wrong password; set the key password to the camera's"};
+  return Error{Error::Code::PermissionDenied,
+               "visionary: wrong password; set the key password to the camera's"};
 }
 
 }  // namespace toftwin::drivers::visionary

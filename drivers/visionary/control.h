@@ -58,8 +58,8 @@ class Control {
  public:
   Control(EventLoop& loop, Endpoint camera) : line_(loop), camera_(std::move(camera)) {}
 
-  /// Opens a session anew if there is none. Errors: those of the line; NotFound, PermissionDenied, InvalidArgument as the
-  /// camera refuses.
+  /// Opens a session anew if there is none. Errors: those of the line; NotFound, PermissionDenied,
+  /// InvalidArgument as the camera refuses.
   Result<Bytes> read(const std::string& variable);
   Result<> write(const std::string& variable, const Bytes& value);
   Result<Bytes> call(const std::string& method, const Bytes& params = {});

@@ -26,7 +26,8 @@ std::vector<float> raysOf(const Description& d) {
       const double x = (u - d.cx) / std::abs(d.fx), y = (v - d.cy) / std::abs(d.fy), r2 = x * x + y * y;
       const double k = 1.0 + d.k1 * r2 + d.k2 * r2 * r2;
       const double length = std::sqrt(k * k * r2 + 1.0);
-      for (const double one : {x * k / length, y * k / length, 1.0 / length}) rays.push_back(static_cast<float>(one));
+      for (const double one : {x * k / length, y * k / length, 1.0 / length})
+        rays.push_back(static_cast<float>(one));
     }
   }
   return rays;
@@ -41,8 +42,14 @@ Result<Optics> opticsOf(const Description& description) {
                        isNumber(description.cy) && isNumber(description.k1) && isNumber(description.k2);
   if (!is_lens) return Error{Error::Code::Incompatible, "visionary: the camera's description has no lens"};
   if (description.k1 == 0.0 && description.k2 == 0.0) {
-    const CameraInfo camera{.width = description.width, .height = description.height, .fx = fx, .fy = fy,
-                            .cx = description.cx, .cy = description.cy, .distortion = {}, .calibration_id = {}};
+    const CameraInfo camera{.width = description.width,
+                            .height = description.height,
+                            .fx = fx,
+                            .fy = fy,
+                            .cx = description.cx,
+                            .cy = description.cy,
+                            .distortion = {},
+                            .calibration_id = {}};
     return Optics{camera, depthPerRange(camera)};
   }
   const std::vector<float> rays = raysOf(description);
@@ -58,13 +65,15 @@ Result<std::vector<Plane>> planesOf(const toftwin::visionary::ReadImages& images
   const int width = per_range.width(), height = per_range.height();
   if (images.distance.size() != per_range.size() || images.state.size() != per_range.size() ||
       images.intensity.size() != per_range.size())
-    return Error{Error::Code::Malformed, "visionary: the blob has not the three images that its description had"};
+    return Error{Error::Code::Malformed,
+                 "visionary: the blob has not the three images that its description had"};
   Image<float> range_m{width, height}, depth_m{width, height}, amplitude{width, height};
   Image<std::uint8_t> flags{width, height};
   for (std::size_t i = 0; i < per_range.size(); ++i) {
     const std::uint16_t counts = images.distance[i];
     const bool has_range = counts != kNone && counts != kNoneEither;
-    range_m[i] = has_range ? static_cast<float>(counts * kMetresPerCount) : std::numeric_limits<float>::quiet_NaN();
+    range_m[i] =
+        has_range ? static_cast<float>(counts * kMetresPerCount) : std::numeric_limits<float>::quiet_NaN();
     depth_m[i] = range_m[i] * per_range[i];
     amplitude[i] = static_cast<float>(images.intensity[i]);
     // The camera's own bits are not public: that there is no range is all that is known.

@@ -26,8 +26,8 @@ namespace {
 
 using toftwin::visionary::BlobReader;
 using toftwin::visionary::Description;
-using toftwin::visionary::ReadImages;
 using toftwin::visionary::Reader;
+using toftwin::visionary::ReadImages;
 using toftwin::visionary::Writer;
 using Clock = std::chrono::steady_clock;
 using std::chrono::milliseconds;
@@ -135,8 +135,8 @@ class Stream {
 
 class VisionarySource final : public Source {
  public:
-  VisionarySource(std::unique_ptr<EventLoop> loop, const Endpoint& control, Endpoint stream, Keys keys, Values values,
-                  const Description& description, Optics optics, bool is_calibrated)
+  VisionarySource(std::unique_ptr<EventLoop> loop, const Endpoint& control, Endpoint stream, Keys keys,
+                  Values values, const Description& description, Optics optics, bool is_calibrated)
       : loop_(std::move(loop)),
         control_(*loop_, control),
         blobs_(std::move(stream)),
@@ -184,7 +184,8 @@ class VisionarySource final : public Source {
     for (const Adjustable& one : kVariables) {
       const auto found = values_.find(one.name);
       if (found != values_.end())
-        state.parameters.push_back({.name = std::string{one.name}, .value = found->second, .bounds = one.bounds});
+        state.parameters.push_back(
+            {.name = std::string{one.name}, .value = found->second, .bounds = one.bounds});
     }
     return state;
   }
@@ -192,12 +193,14 @@ class VisionarySource final : public Source {
   Result<> setParameter(std::string_view name, double value) override {
     const auto* found = std::ranges::find(kVariables, name, &Adjustable::name);
     if (found == kVariables.end() || !values_.contains(name)) {
-      return Error{Error::Code::NotFound, fmt::format("visionary: the camera has no parameter \"{}\"; it has: {}", name,
-                                                      fmt::join(info_.parameters, ", "))};
+      return Error{Error::Code::NotFound,
+                   fmt::format("visionary: the camera has no parameter \"{}\"; it has: {}", name,
+                               fmt::join(info_.parameters, ", "))};
     }
     if (!found->bounds.contains(value)) {
-      return Error{Error::Code::InvalidArgument, fmt::format("{} = {} is out of bounds: it must be a number from {} to {}",
-                                                             name, value, found->bounds.min, found->bounds.max)};
+      return Error{Error::Code::InvalidArgument,
+                   fmt::format("{} = {} is out of bounds: it must be a number from {} to {}", name, value,
+                               found->bounds.min, found->bounds.max)};
     }
     if (auto written = writeValue(control_, keys_.password, *found, value); !written) return written;
     auto values = readValues(control_);
@@ -219,10 +222,11 @@ class VisionarySource final : public Source {
     const auto silent = Clock::now() - since;
     if (silent < std::max<std::chrono::duration<double>>(kLeastSilence, 4.0 * interval))
       return {Error::Code::Timeout, "no frame within a second"};
-    return {Error::Code::Disconnected,
-            fmt::format("visionary: {}: the line is up, but no frame has come for {} ms; the camera hangs, or another program "
-                        "stopped it",
-                        blobs_.address().to_string(), std::chrono::duration_cast<milliseconds>(silent).count())};
+    return {Error::Code::Disconnected, fmt::format("visionary: {}: the line is up, but no frame has come for "
+                                                   "{} ms; the camera hangs, or another program "
+                                                   "stopped it",
+                                                   blobs_.address().to_string(),
+                                                   std::chrono::duration_cast<milliseconds>(silent).count())};
   }
 
   Error badFrame(const Error& error) {
@@ -267,7 +271,8 @@ class VisionarySource final : public Source {
 
   Moment momentOf(const Stream::Item& item) {
     Moment moment;
-    const std::int64_t stamp_ns = toftwin::visionary::unixTime_ms(item.images.packed_time) * kPerMillisecond_ns;
+    const std::int64_t stamp_ns =
+        toftwin::visionary::unixTime_ms(item.images.packed_time) * kPerMillisecond_ns;
     const auto exposure = values_.find("exposure_us");
     moment.exposures.push_back({clock_.read(stamp_ns, item.arrived),
                                 (exposure != values_.end() ? exposure->second : 0.0) * microsecond, 0_Hz});
@@ -320,18 +325,23 @@ Result<Description> firstDescription(EventLoop& loop, Control& control, const En
   if (const auto playing = control.call("PLAYSTART"); !playing) return playing.error();
   const auto item = stream.next(Clock::now() + kAnswerTime, {});
   if (item) return item->description;
-  if (item.error().code != Error::Code::Timeout) return Error{Error::Code::Disconnected, item.error().message};
-  return Error{Error::Code::Disconnected, "visionary: the camera plays, but no frame comes; does it wait for a trigger?"};
+  if (item.error().code != Error::Code::Timeout)
+    return Error{Error::Code::Disconnected, item.error().message};
+  return Error{Error::Code::Disconnected,
+               "visionary: the camera plays, but no frame comes; does it wait for a trigger?"};
 }
 
-Result<std::unique_ptr<Source>> openCamera(const Endpoint& endpoint, Keys keys, const std::optional<CameraInfo>& calibrated) {
+Result<std::unique_ptr<Source>> openCamera(const Endpoint& endpoint, Keys keys,
+                                           const std::optional<CameraInfo>& calibrated) {
   auto loop = std::make_unique<EventLoop>();
   Control control{*loop, endpoint};
   const auto port = control.read("BlobTcpPortAPI");
   if (!port) return port.error();
   const auto number = Reader{*port}.number<std::uint16_t>();
-  if (!number) return Error{Error::Code::Incompatible, "visionary: the camera does not say on which port it streams"};
-  for (const auto& [name, value] : {std::pair{"exposure_us", keys.exposure.in(microsecond)}, {"frame_rate_hz", keys.frame_rate.in(hertz)}}) {
+  if (!number)
+    return Error{Error::Code::Incompatible, "visionary: the camera does not say on which port it streams"};
+  for (const auto& [name, value] : {std::pair{"exposure_us", keys.exposure.in(microsecond)},
+                                    {"frame_rate_hz", keys.frame_rate.in(hertz)}}) {
     if (value <= 0.0) continue;
     const auto* one = std::ranges::find(kVariables, std::string_view{name}, &Adjustable::name);
     if (auto written = writeValue(control, keys.password, *one, value); !written) return written.error();
@@ -349,9 +359,9 @@ Result<std::unique_ptr<Source>> openCamera(const Endpoint& endpoint, Keys keys, 
     optics = Optics{lens->camera, depthPerRange(lens->camera)};
   }
   control.close();
-  return std::unique_ptr<Source>{std::make_unique<VisionarySource>(std::move(loop), endpoint, blobs, std::move(keys),
-                                                                   *std::move(values), *description, *std::move(optics),
-                                                                   calibrated.has_value())};
+  return std::unique_ptr<Source>{
+      std::make_unique<VisionarySource>(std::move(loop), endpoint, blobs, std::move(keys), *std::move(values),
+                                        *description, *std::move(optics), calibrated.has_value())};
 }
 
 Result<std::unique_ptr<Source>> open(settings::Table& table) {

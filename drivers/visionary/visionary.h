@@ -28,7 +28,8 @@ struct Keys {
     v.quantity("frame_rate", frame_rate, hertz, {0.0, 60.0}, "framePeriodUs; 0: as set");
     v.text("calibration", calibration, kCalibrationHelp);
     v.quantity("delay", delay, millisecond, {0.0, 1000.0},
-               "from a frame's time stamp until its first byte is here, if you measured it; 0: unknown, anything up to a "
+               "from a frame's time stamp until its first byte is here, if you measured it; 0: unknown, "
+               "anything up to a "
                "frame interval");
   }
 };

@@ -15,7 +15,8 @@ struct Output {
   static constexpr unsigned kAll = kResults | kErrors | kNotifications;
 };
 
-/// A PCIC command as the maker's cameras understand it. [ifm, operating instructions O3D303, process interface]
+/// A PCIC command as the maker's cameras understand it. [ifm, operating instructions O3D303, process
+/// interface]
 struct Command {
   enum class Kind {
     SetSchema,       ///< "c", nine digits, JSON

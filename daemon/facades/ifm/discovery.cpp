@@ -47,7 +47,8 @@ std::vector<std::byte> encode(const Announcement& a) {
   for (const auto& part : {a.address, a.gateway, a.netmask}) {
     for (const std::uint8_t byte : part) bytes.push_back(std::byte{byte});
   }
-  for (const std::uint16_t number : {a.port, kVendor, a.device, std::uint16_t{0}}) appendBig(bytes, number, 2);
+  for (const std::uint16_t number : {a.port, kVendor, a.device, std::uint16_t{0}})
+    appendBig(bytes, number, 2);
   appendBig(bytes, 0, 8);  // reserved
   for (const std::uint8_t byte : a.mac) bytes.push_back(std::byte{byte});
   appendBig(bytes, 0, 2);  // flags: in the right subnet, no DHCP, not temporary

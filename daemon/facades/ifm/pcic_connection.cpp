@@ -109,7 +109,8 @@ void PcicConnection::activate(const std::string& ticket, int index) {
 }
 
 void PcicConnection::wire(const std::string& ticket, const Command& command) {
-  if (command.number < 1 || command.number > PcicShared::kWires) return reply(ticket, toftwin::o3d303::kRefused);
+  if (command.number < 1 || command.number > PcicShared::kWires)
+    return reply(ticket, toftwin::o3d303::kRefused);
   bool& is_high = shared_.wires[static_cast<std::size_t>(command.number) - 1];
   if (command.kind == Command::Kind::AskWire)
     return reply(ticket, fmt::format("{:02}{}", command.number, is_high ? 1 : 0));

@@ -18,15 +18,16 @@ struct Binding {
   std::string_view place;
   std::string_view parameter;
   enum class Form { Real, Whole, Switch } form = Form::Real;
-  double when_on = 1.0;        ///< of a switch
-  bool is_per_count = false;   ///< the scale is electrons_per_count
+  double when_on = 1.0;       ///< of a switch
+  bool is_per_count = false;  ///< the scale is electrons_per_count
 };
 // Where a source has several of a place, the first counts.
 constexpr std::array kBindings{
     Binding{"/acquisition/exposureLong", "exposure_us", Binding::Form::Whole},
     Binding{"/acquisition/framerate", "frame_rate_hz"},
     Binding{"/processing/diParam/minAmplitude", "minimum_amplitude"},
-    Binding{"/processing/diParam/minAmplitude", "minimum_amplitude_electrons", Binding::Form::Real, 1.0, true},
+    Binding{"/processing/diParam/minAmplitude", "minimum_amplitude_electrons", Binding::Form::Real, 1.0,
+            true},
     Binding{"/processing/diParam/maxSymmetry", "asymmetry_threshold"},
     Binding{"/processing/diParam/enableTemporalFilter", "temporal_filter", Binding::Form::Switch, 2.0},
 };
@@ -80,7 +81,8 @@ void narrow(Leaf& leaf, double least, double most) {
   schema["maximum"] = to;
 }
 
-void showBound(Leaf& leaf, const Binding* binding, const PortFacts& facts, double electrons_per_count, bool is_first) {
+void showBound(Leaf& leaf, const Binding* binding, const PortFacts& facts, double electrons_per_count,
+               bool is_first) {
   if (binding == nullptr) {
     leaf.is_read_only = true;  // the source has nothing of the kind
     return;
@@ -95,19 +97,24 @@ void showBound(Leaf& leaf, const Binding* binding, const PortFacts& facts, doubl
 void showShortExposure(Leaf& leaf, const PortFacts& facts, bool is_first) {
   const Parameter *exposure = find(facts, "exposure_us"), *ratio = find(facts, "exposure_ratio");
   leaf.is_read_only = exposure == nullptr || ratio == nullptr;
-  if (!leaf.is_read_only) show(leaf, static_cast<std::int64_t>(std::llround(*exposure->value / *ratio->value)), is_first);
+  if (!leaf.is_read_only)
+    show(leaf, static_cast<std::int64_t>(std::llround(*exposure->value / *ratio->value)), is_first);
 }
 
 void showMedian(Leaf& leaf, const PortFacts& facts, bool is_first) {
   const Parameter *filter = find(facts, "spatial_filter"), *reach = find(facts, "spatial_filter_reach");
   leaf.is_read_only = filter == nullptr || reach == nullptr;
   if (!leaf.is_read_only)
-    show(leaf, *filter->value == 1.0 ? static_cast<std::int64_t>(std::llround(*reach->value)) : std::int64_t{0}, is_first);
+    show(leaf,
+         *filter->value == 1.0 ? static_cast<std::int64_t>(std::llround(*reach->value)) : std::int64_t{0},
+         is_first);
 }
 
 void showCamera(Configuration& configuration, const std::string& port, const CameraInfo& camera) {
   if (camera.width <= 0 || camera.fx <= 0.0 || camera.fy <= 0.0) return;
-  const auto angle = [](int pixels, double focal) { return std::round(2.0 * kDegrees * std::atan(pixels / (2.0 * focal))); };
+  const auto angle = [](int pixels, double focal) {
+    return std::round(2.0 * kDegrees * std::atan(pixels / (2.0 * focal)));
+  };
   const std::string at = port + "/info/features/";
   configuration.at(at + "fov/horizontal").value = angle(camera.width, camera.fx);
   configuration.at(at + "fov/vertical").value = angle(camera.height, camera.fy);
@@ -131,25 +138,29 @@ void showSource(Configuration& configuration, const PortIdentity& port, const Po
   showMedian(configuration.at(at + std::string{kMedian}), facts, is_first);
 }
 
-Result<SourceChanges> sourceChangesOf(const Configuration& configuration, const Configuration::Changes& changes,
-                                      const PortIdentity& port, const PortFacts& facts, double electrons_per_count) {
+Result<SourceChanges> sourceChangesOf(const Configuration& configuration,
+                                      const Configuration::Changes& changes, const PortIdentity& port,
+                                      const PortFacts& facts, double electrons_per_count) {
   const std::string at = portPointer(port.number);
   const auto changed = [&](std::string_view place) -> const Json* {
-    const auto found = std::ranges::find(changes, at + std::string{place}, &Configuration::Changes::value_type::first);
+    const auto found =
+        std::ranges::find(changes, at + std::string{place}, &Configuration::Changes::value_type::first);
     return found != changes.end() ? &found->second : nullptr;
   };
   SourceChanges wanted;
   for (const Binding& one : kBindings) {
     const Json* value = changed(one.place);
     if (value == nullptr || bindingOf(one.place, facts) != &one) continue;
-    const double number = one.form == Binding::Form::Switch ? (value->get<bool>() ? one.when_on : 0.0)
-                                                            : value->get<double>() * scaleOf(one, electrons_per_count);
+    const double number = one.form == Binding::Form::Switch
+                              ? (value->get<bool>() ? one.when_on : 0.0)
+                              : value->get<double>() * scaleOf(one, electrons_per_count);
     wanted.emplace_back(one.parameter, number);
   }
   // The source has a ratio where the head has two times: either of them changes it.
   const Json *longer = changed(kLong), *shorter = changed(kShort);
   if (shorter != nullptr) {
-    const double long_us = longer != nullptr ? longer->get<double>() : configuration.valueAt(at + std::string{kLong}).get<double>();
+    const double long_us = longer != nullptr ? longer->get<double>()
+                                             : configuration.valueAt(at + std::string{kLong}).get<double>();
     const Parameter* ratio = find(facts, "exposure_ratio");
     const double asked = long_us / shorter->get<double>();
     if (ratio == nullptr || !ratio->bounds.contains(asked)) {

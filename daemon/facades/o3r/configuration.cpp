@@ -60,7 +60,8 @@ Result<> fits(const std::string& pointer, const Json& value, const Json& schema)
 
 /// The same number in the schema's type: 10.0 is 10 where whole numbers are.
 Json normal(const Json& value, const Json& schema) {
-  if (schema.at("type") == "integer" && value.is_number_float()) return static_cast<std::int64_t>(value.get<double>());
+  if (schema.at("type") == "integer" && value.is_number_float())
+    return static_cast<std::int64_t>(value.get<double>());
   return value;
 }
 
@@ -68,9 +69,12 @@ Json normal(const Json& value, const Json& schema) {
 std::string escaped(const std::string& name) {
   std::string text;
   for (const char c : name) {
-    if (c == '~') text += "~0";
-    else if (c == '/') text += "~1";
-    else text += c;
+    if (c == '~')
+      text += "~0";
+    else if (c == '/')
+      text += "~1";
+    else
+      text += c;
   }
   return text;
 }

@@ -12,7 +12,8 @@ using toftwin::o3d303::XmlRpcAnswer;
 using toftwin::o3d303::XmlRpcFault;
 using toftwin::o3d303::XmlRpcValue;
 
-constexpr std::string_view kMain = "/api/rpc/v1/com.ifm.efector/", kDiagnostic = "/api/rpc/v1/com.ifm.diagnostic/";
+constexpr std::string_view kMain = "/api/rpc/v1/com.ifm.efector/",
+                           kDiagnostic = "/api/rpc/v1/com.ifm.diagnostic/";
 constexpr const char *kBox = "/device/crypto/sealedbox", *kKeys = "/device/network/authorized_keys";
 constexpr std::size_t kMostPointers = 64, kLongestPassword = 256;
 
@@ -43,10 +44,10 @@ std::vector<std::string> pointersIn(const toftwin::o3d303::XmlRpcCall& call) {
 
 XmlRpcFault faultOf(const Error& error) {
   using Code = Error::Code;
-  const int code = error.code == Code::NotFound           ? Fault::kNoSuchParameter
-                   : error.code == Code::InvalidArgument  ? Fault::kOutOfRange
-                   : error.code == Code::Unsupported      ? Fault::kReadOnly
-                   : error.code == Code::PermissionDenied ? Fault::kWrongPassword
+  const int code = error.code == Code::NotFound                                    ? Fault::kNoSuchParameter
+                   : error.code == Code::InvalidArgument                           ? Fault::kOutOfRange
+                   : error.code == Code::Unsupported                               ? Fault::kReadOnly
+                   : error.code == Code::PermissionDenied                          ? Fault::kWrongPassword
                    : error.code == Code::Malformed || error.code == Code::TooLarge ? Fault::kWrongFormat
                                                                                    : Fault::kInternal;
   return {code, error.message};
@@ -58,8 +59,9 @@ Device::Device(const Identity& identity, std::vector<PortIdentity> ports, double
   configuration_.add(std::string{kBox} + "/message",
                      {.value = "", .schema = {{"type", "string"}, {"maxLength", 65'536}}, .factory = {}});
   const auto shown = [&](const char* name, Json value, const char* type) {
-    configuration_.add(std::string{kBox} + name,
-                       {.value = std::move(value), .schema = {{"type", type}}, .factory = {}, .is_read_only = true});
+    configuration_.add(
+        std::string{kBox} + name,
+        {.value = std::move(value), .schema = {{"type", type}}, .factory = {}, .is_read_only = true});
   };
   shown("/public_key", box_.publicKey(), "string");
   shown("/passwordProtected", false, "boolean");
@@ -128,17 +130,22 @@ std::optional<Device::Outcome> Device::answerConfiguration(const Call& call) {
     return make(configuration_.resetOf(textParam(call, 0)));
   }
   if (call.method == "remove") {
-    return Outcome{fault(Fault::kNoSuchParameter, fmt::format("there is no \"{}\" that can be removed: no applications run here",
-                                                              textParam(call, 0)))};
+    return Outcome{fault(
+        Fault::kNoSuchParameter,
+        fmt::format("there is no \"{}\" that can be removed: no applications run here", textParam(call, 0)))};
   }
   return std::nullopt;
 }
 
 std::optional<Device::Answer> Device::answerQuestion(const Call& call) const {
   using Struct = XmlRpcValue::Struct;
-  const auto valueAt = [&](const char* pointer) { return configuration_.valueAt(pointer).get<std::string>(); };
+  const auto valueAt = [&](const char* pointer) {
+    return configuration_.valueAt(pointer).get<std::string>();
+  };
   if (call.method == "getSWVersion") {
-    return XmlRpcValue{Struct{{"IFM_Software", kFirmware}, {"Linux", ""}, {"Main_Application", kFirmware},
+    return XmlRpcValue{Struct{{"IFM_Software", kFirmware},
+                              {"Linux", ""},
+                              {"Main_Application", kFirmware},
                               {"Diagnostic_Controller", "v0.0.11"}}};
   }
   if (call.method == "getHWInfo") {
@@ -156,7 +163,8 @@ std::optional<Device::Answer> Device::answerQuestion(const Call& call) const {
   if (name == "ArticleNumber") return XmlRpcValue{valueAt("/device/info/partNumber")};
   if (name == "Name") return XmlRpcValue{valueAt("/device/info/name")};
   if (name == "Description") return XmlRpcValue{valueAt("/device/info/description")};
-  return fault(Fault::kNoSuchParameter, fmt::format("there is no parameter \"{}\"; ask `get` for the configuration", name));
+  return fault(Fault::kNoSuchParameter,
+               fmt::format("there is no parameter \"{}\"; ask `get` for the configuration", name));
 }
 
 Device::Outcome Device::set(const std::string& text) {
@@ -180,7 +188,8 @@ Device::Outcome Device::setTree(const Json& tree, bool is_sealed) {
   if (is_locked_ && !is_sealed && !changes->empty())
     return {fault(Fault::kWrongPassword, "the configuration is locked")};
   if (box_.isProtected() && !is_sealed && changed(kKeys) != changes->end())
-    return {fault(Fault::kWrongPassword, "authorized_keys is set by a sealed message only: there is a password")};
+    return {
+        fault(Fault::kWrongPassword, "authorized_keys is set by a sealed message only: there is a password")};
   return make(changes);
 }
 
@@ -191,7 +200,9 @@ Device::Outcome Device::setSealed(const std::string& message) {
   return setTree(*tree, true);
 }
 
-void Device::showBox() { configuration_.at(std::string{kBox} + "/passwordProtected").value = box_.isProtected(); }
+void Device::showBox() {
+  configuration_.at(std::string{kBox} + "/passwordProtected").value = box_.isProtected();
+}
 
 Device::Outcome Device::make(const Result<Configuration::Changes>& changes) {
   if (!changes) return {faultOf(changes.error())};
@@ -227,7 +238,8 @@ std::map<int, SourceChanges> Device::restart() {
 
 Device::Answer Device::lock(const std::string& password) {
   if (is_locked_) return fault(Fault::kWrongPassword, "the configuration is locked already");
-  if (password.size() > kLongestPassword) return fault(Fault::kOutOfRange, "a password has at most 256 bytes");
+  if (password.size() > kLongestPassword)
+    return fault(Fault::kOutOfRange, "a password has at most 256 bytes");
   lock_password_ = password;
   is_locked_ = !password.empty();
   return nothing();

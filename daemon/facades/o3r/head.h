@@ -15,7 +15,8 @@
 
 namespace toftwin::daemon::o3r {
 
-/// A head at a port of the unit: a source, and the PCIC port on which its frames leave. Used on the facade's thread.
+/// A head at a port of the unit: a source, and the PCIC port on which its frames leave. Used on the facade's
+/// thread.
 class Head {
  public:
   struct Hooks {
@@ -25,8 +26,8 @@ class Head {
     std::function<void()> connections;
   };
   /// `place` with this head's source.
-  Head(EventThread& thread, const FacadePlace& place, bool is_3d, Scales scales, LineFaults faults, Duration delay,
-       Hooks hooks);
+  Head(EventThread& thread, const FacadePlace& place, bool is_3d, Scales scales, LineFaults faults,
+       Duration delay, Hooks hooks);
 
   void listen(Listening listening);
   [[nodiscard]] std::uint16_t port() const { return server_->port(); }

@@ -31,11 +31,13 @@ constexpr float kLeastRange_m = 0.1F;
 std::int64_t hostTimeOf(const Frame& frame, DeviceTime device) {
   const ClockRelation& clock = frame.moment.clock;
   const bool is_known = clock.uncertainty_ns >= 0 && !frame.moment.exposures.empty();
-  return std::max<std::int64_t>(0, is_known ? device.ns + clock.host_minus_device_ns : frame.moment.received.ns);
+  return std::max<std::int64_t>(0,
+                                is_known ? device.ns + clock.host_minus_device_ns : frame.moment.received.ns);
 }
 
 std::int64_t beginOf(const Frame& frame) {
-  return hostTimeOf(frame, frame.moment.exposures.empty() ? DeviceTime{} : frame.moment.exposures.front().start);
+  return hostTimeOf(frame,
+                    frame.moment.exposures.empty() ? DeviceTime{} : frame.moment.exposures.front().start);
 }
 
 HeadFrame headerOf(const Frame& frame) {
@@ -98,7 +100,8 @@ Result<std::vector<std::uint16_t>> distancesOf(const Frame& frame, float resolut
   const Plane* range = planeOf(frame, PlaneKind::Range, ElementType::F32);
   const Plane* depth = planeOf(frame, PlaneKind::Depth, ElementType::F32);
   if (range == nullptr && depth == nullptr)
-    return Error{Error::Code::Unsupported, "the source has neither range nor depth, which a 3D head is made of"};
+    return Error{Error::Code::Unsupported,
+                 "the source has neither range nor depth, which a 3D head is made of"};
   const auto metres = (range != nullptr ? range : depth)->as<float>();
   const std::vector<float> rays = range != nullptr ? std::vector<float>{} : unitVectorsOf(frame.camera);
   std::vector<std::uint16_t> counts(metres.size());
@@ -167,7 +170,8 @@ Result<HeadImages> images2d(const Frame& frame, const LensModels& lens, const Sc
   if (color == nullptr || color->type != ElementType::U8 || color->channels != kChannels ||
       color->data.size() != color->byteSize())
     return Error{Error::Code::Unsupported, "the source has no colour image, which a 2D head is made of"};
-  auto jpeg = pictures::encodeJpeg(color->as<std::uint8_t>(), color->width, color->height, scales.jpeg_quality);
+  auto jpeg =
+      pictures::encodeJpeg(color->as<std::uint8_t>(), color->width, color->height, scales.jpeg_quality);
   if (!jpeg) return jpeg.error();
   HeadImages images{.jpeg = *std::move(jpeg), .wire = headerOf(frame)};
   images.wire.width = static_cast<std::uint32_t>(color->width);
@@ -185,11 +189,12 @@ Result<HeadImages> images2d(const Frame& frame, const LensModels& lens, const Sc
 }
 
 std::vector<std::byte> algorithmMessage(const HeadImages& images) {
-  const std::string text = fmt::format(R"({{"frameCount":{},"width":{},"height":{}}})", images.wire.frame_count,
-                                       images.wire.width, images.wire.height);
+  const std::string text = fmt::format(R"({{"frameCount":{},"width":{},"height":{}}})",
+                                       images.wire.frame_count, images.wire.width, images.wire.height);
   std::vector<std::byte> message;
   toftwin::o3d303::appendText(message, toftwin::o3d303::kFrameBegin);
-  appendBytesChunk(message, toftwin::o3r::ChunkTypes::kAlgorithm, images.wire, std::as_bytes(std::span{text}));
+  appendBytesChunk(message, toftwin::o3r::ChunkTypes::kAlgorithm, images.wire,
+                   std::as_bytes(std::span{text}));
   toftwin::o3d303::appendText(message, toftwin::o3d303::kFrameEnd);
   return message;
 }

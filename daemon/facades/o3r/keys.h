@@ -9,8 +9,8 @@
 #include "daemon/facades/facade.h"
 #include "daemon/facades/struck_frames.h"
 
-/// An ifm O3R as its clients know it: a video processing unit with heads at its ports, each of which is a source.
-/// XML-RPC with one JSON configuration, PCIC for each port's frames, UDP to be found.
+/// An ifm O3R as its clients know it: a video processing unit with heads at its ports, each of which is a
+/// source. XML-RPC with one JSON configuration, PCIC for each port's frames, UDP to be found.
 namespace toftwin::daemon::o3r {
 
 /// What goes wrong on purpose with the frames' PCIC messages, of all ports.
@@ -40,20 +40,25 @@ struct Keys {
 
   template <class Visitor>
   void visit(Visitor& v) {
-    v.number("xmlrpc_port", xmlrpc_port, {0, 65'535},
-             "TCP port of the configuration, the device's own by default; 0: any free one, which the log tells");
+    v.number(
+        "xmlrpc_port", xmlrpc_port, {0, 65'535},
+        "TCP port of the configuration, the device's own by default; 0: any free one, which the log tells");
     v.number("pcic_port", pcic_port, {0, 65'529},
              "TCP port of the frames of port0; port1 has the next one, and so on; clients ask for it "
              "(data/pcicTCPPort). 0: any free ones");
-    v.number("diagnostic_port", diagnostic_port, {0, 65'535}, "TCP port of device/diagnostic, on which no frames come");
+    v.number("diagnostic_port", diagnostic_port, {0, 65'535},
+             "TCP port of device/diagnostic, on which no frames come");
     v.flag("discoverable", discoverable, "whether it answers the vendor's search for devices");
     v.number("discovery_port", discovery_port, {1, 65'535}, "UDP port of that search");
     v.text("name", name, "of the device (device/info/name), until a client sets another");
-    v.texts("ports", ports,
-            "what is plugged in: for port0, port1, and so on to port5 the name of a [[source]] for its 3D images, NAME/2D "
-            "for its colour image, or \"\" for nothing. Empty: source at port2, 3D, as in the vendor's examples");
+    v.texts(
+        "ports", ports,
+        "what is plugged in: for port0, port1, and so on to port5 the name of a [[source]] for its 3D "
+        "images, NAME/2D "
+        "for its colour image, or \"\" for nothing. Empty: source at port2, 3D, as in the vendor's examples");
     v.number("electrons_per_count", electrons_per_count, {1e-6, 1e9},
-             "what one count of amplitude stands for in the source's unit, before it is divided by the exposure time");
+             "what one count of amplitude stands for in the source's unit, before it is divided by the "
+             "exposure time");
     v.quantity("longest_range", longest_range, metre, {0.1, 1000.0},
                "of the distance image, which has 65,535 steps up to there: 10 m as in a real head");
     v.number("jpeg_quality", jpeg_quality, {1, 100}, "of the colour image");

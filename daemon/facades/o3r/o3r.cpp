@@ -35,7 +35,8 @@ using toftwin::o3d303::XmlRpcFault;
 
 std::string macText(std::string_view of) {
   const auto mac = macOf(of);
-  return fmt::format("{:02X}:{:02X}:{:02X}:{:02X}:{:02X}:{:02X}", mac[0], mac[1], mac[2], mac[3], mac[4], mac[5]);
+  return fmt::format("{:02X}:{:02X}:{:02X}:{:02X}:{:02X}:{:02X}", mac[0], mac[1], mac[2], mac[3], mac[4],
+                     mac[5]);
 }
 
 /// Always the same for a name.
@@ -67,7 +68,9 @@ class O3rFacade final : public Facade {
     std::vector<PortIdentity> ports;
     for (const Plug& plug : plugs_) {
       if (auto opened = openHead(plug); !opened) return opened;
-      ports.push_back({.number = plug.port, .is_3d = plug.is_3d, .pcic_port = heads_.at(plug.port)->port(),
+      ports.push_back({.number = plug.port,
+                       .is_3d = plug.is_3d,
+                       .pcic_port = heads_.at(plug.port)->port(),
                        .serial = serialOf(fmt::format("{}/{}", plug.source, plug.port))});
     }
     const int xmlrpc_port = xmlrpc->acceptor.local_endpoint().port();
@@ -99,12 +102,15 @@ class O3rFacade final : public Facade {
     auto diagnostic = listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.diagnostic_port),
                                 "diagnostic_port");
     if (!diagnostic) return diagnostic.error();
-    diagnostic_.emplace(*std::move(diagnostic),
-                        ifm::PcicServer::Hooks{.trigger = [](const auto& done) { done(ifm::PcicError::kNoTriggerAllowed); },
-                                               .default_schema = [] { return toftwin::o3r::schemaOf({}); },
-                                               .ask = [](std::string_view) { return std::string{}; },
-                                               .connections = [](std::size_t) {},
-                                               .serves = [](const auto& schema) { return writeHeadFrame(schema, toftwin::o3r::HeadFrame{}).ok(); }});
+    diagnostic_.emplace(
+        *std::move(diagnostic),
+        ifm::PcicServer::Hooks{
+            .trigger = [](const auto& done) { done(ifm::PcicError::kNoTriggerAllowed); },
+            .default_schema = [] { return toftwin::o3r::schemaOf({}); },
+            .ask = [](std::string_view) { return std::string{}; },
+            .connections = [](std::size_t) {},
+            .serves =
+                [](const auto& schema) { return writeHeadFrame(schema, toftwin::o3r::HeadFrame{}).ok(); }});
     return {};
   }
 
@@ -114,11 +120,13 @@ class O3rFacade final : public Facade {
     const int wanted = keys_.pcic_port == 0 ? 0 : keys_.pcic_port + plug.port;
     auto listening = listenFor(thread_.io(), place.keys, static_cast<std::uint16_t>(wanted), "pcic_port");
     if (!listening) return listening.error();
-    const Scales scales{.electrons_per_count = keys_.electrons_per_count,
-                        .distance_resolution_m = toftwin::o3r::distanceResolution(keys_.longest_range.in(metre)),
-                        .jpeg_quality = static_cast<int>(keys_.jpeg_quality)};
+    const Scales scales{
+        .electrons_per_count = keys_.electrons_per_count,
+        .distance_resolution_m = toftwin::o3r::distanceResolution(keys_.longest_range.in(metre)),
+        .jpeg_quality = static_cast<int>(keys_.jpeg_quality)};
     auto head = std::make_unique<Head>(
-        thread_, place, plug.is_3d, scales, LineFaults{keys_.line, name_, lineLogOf(plug)}, keys_.line.delay_time,
+        thread_, place, plug.is_3d, scales, LineFaults{keys_.line, name_, lineLogOf(plug)},
+        keys_.line.delay_time,
         Head::Hooks{.settings = [this, port = plug.port] { return device_->head(port); },
                     .connections = [this] { countConnections(); }});
     head->listen(*std::move(listening));
@@ -141,7 +149,8 @@ class O3rFacade final : public Facade {
                                              .host_name = place_.keys.source,
                                              .device_name = keys_.name});
     // Who knows the address needs no search, and another device of this machine may be the one that is found.
-    if (!discovery) return logging::warn("{}: it cannot be searched for: {}", name_, discovery.error().message);
+    if (!discovery)
+      return logging::warn("{}: it cannot be searched for: {}", name_, discovery.error().message);
     discovery_ = *std::move(discovery);
   }
 
@@ -161,11 +170,12 @@ class O3rFacade final : public Facade {
     const auto before = std::make_shared<const Device>(*device_);
     const Device::Outcome outcome = device_->answer(path, *call);
     if (outcome.is_reboot) reboot();
-    change(outcome.changes, [this, before, told = outcome.answer, answer = std::move(answer)](const Result<>& done) {
-      if (!done) device_.emplace(*before);  // all of it or nothing
-      updateHeads();
-      answer(encodeXmlRpc(done ? told : XmlRpcAnswer{faultOf(done.error())}));
-    });
+    change(outcome.changes,
+           [this, before, told = outcome.answer, answer = std::move(answer)](const Result<>& done) {
+             if (!done) device_.emplace(*before);  // all of it or nothing
+             updateHeads();
+             answer(encodeXmlRpc(done ? told : XmlRpcAnswer{faultOf(done.error())}));
+           });
   }
 
   using Wanted = std::map<int, SourceChanges>;
@@ -192,7 +202,8 @@ class O3rFacade final : public Facade {
     const auto description = heads_.at(port)->link().describe();
     if (!description) return present;
     for (const Parameter& one : description->parameters) {
-      const bool is_changed = std::ranges::find(changes, one.name, &SourceChanges::value_type::first) != changes.end();
+      const bool is_changed =
+          std::ranges::find(changes, one.name, &SourceChanges::value_type::first) != changes.end();
       if (is_changed && one.value) present.emplace_back(one.name, *one.value);
     }
     return present;
@@ -281,8 +292,8 @@ FacadeKind::Start read(settings::Table& table) {
   const std::string source = table.anew().text("source").value_or("");
   auto plugs = plugsOf(keys.ports, source);
   if (!plugs) table.complain("ports", plugs.error().message);
-  return [keys, log, plugs = plugs ? *plugs : std::vector<Plug>{}](const FacadePlace& place)
-             -> Result<std::unique_ptr<Facade>> {
+  return [keys, log, plugs = plugs ? *plugs : std::vector<Plug>{}](
+             const FacadePlace& place) -> Result<std::unique_ptr<Facade>> {
     auto facade = std::make_unique<O3rFacade>(keys, plugs, log, place);
     if (auto opened = facade->open(); !opened) return opened.error();
     return std::unique_ptr<Facade>{std::move(facade)};
@@ -302,12 +313,14 @@ FacadeKind::MoreSources moreSources(settings::Table table) {
 }  // namespace
 
 FacadeKind facade() {
-  return {.name = "o3r",
-          .summary = "an ifm O3R with one to six heads: XML-RPC with a JSON configuration, PCIC, the vendor's search",
-          .read = read,
-          .document = [] { return settings::markdownTable(settings::keysOf<Keys>()); },
-          .not_built = {},
-          .more_sources = moreSources};
+  return {
+      .name = "o3r",
+      .summary =
+          "an ifm O3R with one to six heads: XML-RPC with a JSON configuration, PCIC, the vendor's search",
+      .read = read,
+      .document = [] { return settings::markdownTable(settings::keysOf<Keys>()); },
+      .not_built = {},
+      .more_sources = moreSources};
 }
 
 }  // namespace toftwin::daemon::o3r

@@ -24,15 +24,19 @@ Json oneOf(std::vector<std::string> words) { return {{"type", "string"}, {"enum"
 /// Adds leaves below one place.
 class Below {
  public:
-  Below(Configuration& configuration, std::string place) : configuration_(configuration), place_(std::move(place)) {}
+  Below(Configuration& configuration, std::string place)
+      : configuration_(configuration), place_(std::move(place)) {}
   void shown(const std::string& name, Json value, std::string_view type) {
-    configuration_.add(place_ + name, {.value = std::move(value), .schema = typed(type), .factory = {}, .is_read_only = kReadOnly});
+    configuration_.add(
+        place_ + name,
+        {.value = std::move(value), .schema = typed(type), .factory = {}, .is_read_only = kReadOnly});
   }
   void shown(const std::string& name, const char* value) { shown(name, value, "string"); }
   void shown(const std::string& name, const std::string& value) { shown(name, value, "string"); }
   void shown(const std::string& name, std::int64_t value) { shown(name, value, "integer"); }
   void settable(const std::string& name, Json value, Json schema) {
-    configuration_.add(place_ + name, {.value = std::move(value), .schema = std::move(schema), .factory = {}});
+    configuration_.add(place_ + name,
+                       {.value = std::move(value), .schema = std::move(schema), .factory = {}});
   }
 
  private:
@@ -109,9 +113,11 @@ void addVersion(Below& port, const std::string& of) {
 
 void addProcessing(Below port) {
   for (const char* axis : {"transX", "transY", "transZ"})
-    port.settable(fmt::format("/processing/extrinsicHeadToUser/{}", axis), 0.0, ranged("number", -100.0, 100.0));
+    port.settable(fmt::format("/processing/extrinsicHeadToUser/{}", axis), 0.0,
+                  ranged("number", -100.0, 100.0));
   for (const char* axis : {"rotX", "rotY", "rotZ"})
-    port.settable(fmt::format("/processing/extrinsicHeadToUser/{}", axis), 0.0, ranged("number", -6.2832, 6.2832));
+    port.settable(fmt::format("/processing/extrinsicHeadToUser/{}", axis), 0.0,
+                  ranged("number", -6.2832, 6.2832));
   addVersion(port, "/processing");
 }
 
@@ -168,7 +174,8 @@ void addPort(Configuration& configuration, const PortIdentity& port) {
     addAcquisition3d(below);
     addFilters(below);
   } else {
-    below.settable("/mode", "standard_autoexposure2D", oneOf({"standard_autoexposure2D", "experimental_autoexposure2D"}));
+    below.settable("/mode", "standard_autoexposure2D",
+                   oneOf({"standard_autoexposure2D", "experimental_autoexposure2D"}));
   }
 }
 

@@ -37,11 +37,14 @@ std::string portPointer(int number);
 /// The tree of a unit without heads, and what a head adds to it.
 void addUnit(Configuration& configuration, const Identity& identity);
 void addPort(Configuration& configuration, const PortIdentity& port);
-/// What the source has now is what is shown, with its bounds. At the first time it is also what a reset makes.
+/// What the source has now is what is shown, with its bounds. At the first time it is also what a reset
+/// makes.
 void showSource(Configuration& configuration, const PortIdentity& port, const PortFacts& facts,
                 double electrons_per_count, bool is_first);
-/// What those changes are of a source: its parameters and their values. InvalidArgument: they cannot be together.
-Result<SourceChanges> sourceChangesOf(const Configuration& configuration, const Configuration::Changes& changes,
-                                      const PortIdentity& port, const PortFacts& facts, double electrons_per_count);
+/// What those changes are of a source: its parameters and their values. InvalidArgument: they cannot be
+/// together.
+Result<SourceChanges> sourceChangesOf(const Configuration& configuration,
+                                      const Configuration::Changes& changes, const PortIdentity& port,
+                                      const PortFacts& facts, double electrons_per_count);
 
 }  // namespace toftwin::daemon::o3r

@@ -13,8 +13,9 @@ Result<std::vector<Plug>> plugsOf(const std::vector<std::string>& ports, const s
   constexpr std::string_view k2d = "/2D";
   if (ports.empty()) return std::vector<Plug>{{.port = kUsual3d, .source = source}};
   if (ports.size() > kPorts) {
-    return Error{Error::Code::InvalidArgument,
-                 fmt::format("has {} entries, but the unit has {} ports, port0 to port5", ports.size(), kPorts)};
+    return Error{
+        Error::Code::InvalidArgument,
+        fmt::format("has {} entries, but the unit has {} ports, port0 to port5", ports.size(), kPorts)};
   }
   std::vector<Plug> plugs;
   for (std::size_t i = 0; i < ports.size(); ++i) {
@@ -24,7 +25,8 @@ Result<std::vector<Plug>> plugsOf(const std::vector<std::string>& ports, const s
                      .source = ports[i].substr(0, ports[i].size() - (is_2d ? k2d.size() : 0)),
                      .is_3d = !is_2d});
   }
-  if (plugs.empty()) return Error{Error::Code::InvalidArgument, "plugs nothing in; name the source of a port"};
+  if (plugs.empty())
+    return Error{Error::Code::InvalidArgument, "plugs nothing in; name the source of a port"};
   return plugs;
 }
 

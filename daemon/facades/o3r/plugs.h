@@ -16,8 +16,8 @@ struct Plug {
   bool operator==(const Plug&) const = default;
 };
 
-/// Of the key `ports`: for each port in turn NAME, NAME/2D, or nothing. `source` at port2 where the key is empty.
-/// InvalidArgument: more ports than there are, or nothing is plugged in.
+/// Of the key `ports`: for each port in turn NAME, NAME/2D, or nothing. `source` at port2 where the key is
+/// empty. InvalidArgument: more ports than there are, or nothing is plugged in.
 Result<std::vector<Plug>> plugsOf(const std::vector<std::string>& ports, const std::string& source);
 
 }  // namespace toftwin::daemon::o3r

@@ -17,7 +17,9 @@ static_assert(crypto_box_PUBLICKEYBYTES == 32 && crypto_box_SECRETKEYBYTES == 32
 constexpr std::size_t kMostNonces = 1024, kLongestBoxPassword = 256;
 
 Error notUnderstood(const char* why) { return {Error::Code::Malformed, std::string{"sealed box: "} + why}; }
-Error notAllowed(const char* why) { return {Error::Code::PermissionDenied, std::string{"sealed box: "} + why}; }
+Error notAllowed(const char* why) {
+  return {Error::Code::PermissionDenied, std::string{"sealed box: "} + why};
+}
 
 std::string textAt(const Json& request, const char* name) {
   const auto found = request.find(name);
@@ -42,11 +44,12 @@ std::string SealedBox::publicKey() const {
 
 Result<Json> SealedBox::open(const std::string& message) {
   const auto sealed = toftwin::o3d303::fromBase64(message);
-  if (!sealed || sealed->size() < crypto_box_SEALBYTES) return notUnderstood("the message is no base64, or too short");
+  if (!sealed || sealed->size() < crypto_box_SEALBYTES)
+    return notUnderstood("the message is no base64, or too short");
   std::string text(sealed->size() - crypto_box_SEALBYTES, '\0');
   const auto* cipher = reinterpret_cast<const unsigned char*>(sealed->data());
-  if (crypto_box_seal_open(reinterpret_cast<unsigned char*>(text.data()), cipher, sealed->size(), public_key_.data(),
-                           secret_key_.data()) != 0)
+  if (crypto_box_seal_open(reinterpret_cast<unsigned char*>(text.data()), cipher, sealed->size(),
+                           public_key_.data(), secret_key_.data()) != 0)
     return notUnderstood("the message is not sealed for public_key");
   const auto request = readJson(text);
   if (!request || !request->is_object()) return notUnderstood("the message holds no JSON object");
@@ -67,7 +70,8 @@ Result<Json> SealedBox::obey(const Json& request) {
   const std::string what = textAt(request, "request");
   if (what == "set_password") {
     std::string wanted = textAt(request, "new_password");
-    if (wanted.empty() || wanted.size() > kLongestBoxPassword) return notUnderstood("new_password has 1 to 256 bytes");
+    if (wanted.empty() || wanted.size() > kLongestBoxPassword)
+      return notUnderstood("new_password has 1 to 256 bytes");
     password_ = std::move(wanted);
     return Json::object();
   }

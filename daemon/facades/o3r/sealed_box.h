@@ -23,9 +23,9 @@ class SealedBox {
   [[nodiscard]] std::string publicKey() const;
   [[nodiscard]] bool isProtected() const { return !password_.empty(); }
 
-  /// What a message, in base64, asks for; a password that it sets is set. The configuration to be set, an empty
-  /// object if there is none. Malformed: it is not sealed for this key, or says nothing known; PermissionDenied:
-  /// wrong password, or the message was here before.
+  /// What a message, in base64, asks for; a password that it sets is set. The configuration to be set, an
+  /// empty object if there is none. Malformed: it is not sealed for this key, or says nothing known;
+  /// PermissionDenied: wrong password, or the message was here before.
   Result<Json> open(const std::string& message);
 
  private:

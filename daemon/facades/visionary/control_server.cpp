@@ -54,7 +54,8 @@ class ControlServer::Connection : public std::enable_shared_from_this<Connection
       return again();
     }
     server_.ask_(std::get<ColaCommand>(wanted), session_.client(),
-                 [self = shared_from_this(), asked = Telegram{(*telegram)->session, (*telegram)->request, {}}](Bytes answer) mutable {
+                 [self = shared_from_this(),
+                  asked = Telegram{(*telegram)->session, (*telegram)->request, {}}](Bytes answer) mutable {
                    if (!*self->alive_ || !self->socket_.is_open()) return;
                    asked.command = std::move(answer);
                    self->send(asked);

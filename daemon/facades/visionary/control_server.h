@@ -15,7 +15,8 @@
 
 namespace toftwin::daemon::visionary {
 
-/// The port on which the camera is set, in CoLa 2. A client that stalls holds up nobody. Used on the facade's thread.
+/// The port on which the camera is set, in CoLa 2. A client that stalls holds up nobody. Used on the facade's
+/// thread.
 class ControlServer {
  public:
   using Answer = std::function<void(Bytes)>;

@@ -28,8 +28,8 @@ Device::Outcome done(const ColaCommand& command, std::span<const std::byte> told
   return {.answer = answerTo(command, told)};
 }
 
-/// Entries of a log, all free: number and state, first and last time (power-ons, seconds of operation, time), how often,
-/// reserved, text.
+/// Entries of a log, all free: number and state, first and last time (power-ons, seconds of operation, time),
+/// how often, reserved, text.
 Bytes emptyLog(int entries) {
   Writer writer;
   for (int i = 0; i < entries; ++i) {
@@ -47,7 +47,8 @@ std::vector<std::uint8_t> randomBytes(std::size_t size) {
   return bytes;
 }
 
-/// A variable of 32 bits without sign that is a parameter of the source, and how many of it one of the other is.
+/// A variable of 32 bits without sign that is a parameter of the source, and how many of it one of the other
+/// is.
 struct SourceVariable {
   std::string_view name, parameter;
 };
@@ -87,7 +88,8 @@ Device::Told Device::identityVariable(std::string_view name) const {
   constexpr std::string_view kOrderNumber = "1112649";
   if (name == "DIornr") return Writer{}.raw(std::as_bytes(std::span{kOrderNumber})).bytes();
   if (name == "LocationName") return Writer{}.text("not defined").bytes();
-  if (name == "BlobTcpPortAPI") return Writer{}.number(static_cast<std::uint16_t>(identity_.stream_port)).bytes();
+  if (name == "BlobTcpPortAPI")
+    return Writer{}.number(static_cast<std::uint16_t>(identity_.stream_port)).bytes();
   if (name == "BlobTransportProtocolAPI") return Writer{}.number(std::uint8_t{0}).bytes();  // TCP
   return std::nullopt;
 }
@@ -108,7 +110,8 @@ Device::Told Device::stateVariable(std::string_view name) const {
   constexpr std::uint8_t kGood = 3;
   if (name == "TmpLvl" || name == "OpVoltageStatus") return Writer{}.number(kGood).bytes();
   if (name == "illuminationActive") return Writer{}.flag(mode_ != FrontendMode::Stop).bytes();
-  const auto tenths = static_cast<std::int16_t>(std::lround(10.0 * std::clamp(facts_.temperature_c, -300.0, 3000.0)));
+  const auto tenths =
+      static_cast<std::int16_t>(std::lround(10.0 * std::clamp(facts_.temperature_c, -300.0, 3000.0)));
   if (name == "SysTemperatureCurrentValue") return Writer{}.number(tenths).bytes();
   if (name == kTemperatureMargin) return Writer{}.number(temperature_margin_c_).bytes();
   // Lists, with how many they have before them.
@@ -120,17 +123,21 @@ Device::Told Device::stateVariable(std::string_view name) const {
 }
 
 Device::Told Device::sourceVariable(std::string_view name) const {
-  const auto counted = [](double number) { return Writer{}.number(static_cast<std::uint32_t>(std::lround(number))).bytes(); };
+  const auto counted = [](double number) {
+    return Writer{}.number(static_cast<std::uint32_t>(std::lround(number))).bytes();
+  };
   if (name == kIntegrationTime.name) {
     const Parameter* found = parameter(kIntegrationTime.parameter);
     if (found != nullptr) return counted(std::clamp(*found->value, 0.0, 1e9));
   }
-  if (name == kFramePeriod && facts_.frame_interval_us) return counted(std::clamp(*facts_.frame_interval_us, 0.0, 4e9));
+  if (name == kFramePeriod && facts_.frame_interval_us)
+    return counted(std::clamp(*facts_.frame_interval_us, 0.0, 4e9));
   return std::nullopt;
 }
 
 Device::Outcome Device::read(const ColaCommand& command) const {
-  for (const auto& told : {identityVariable(command.name), stateVariable(command.name), sourceVariable(command.name)}) {
+  for (const auto& told :
+       {identityVariable(command.name), stateVariable(command.name), sourceVariable(command.name)}) {
     if (told) return done(command, *told);
   }
   return refused(ColaError::UnknownVariable);
@@ -139,7 +146,8 @@ Device::Outcome Device::read(const ColaCommand& command) const {
 std::optional<ColaError> Device::writeSwitch(const ColaCommand& command) {
   const auto value = Reader{command.params}.number<std::uint8_t>();
   const auto function = functions_.find(command.name);
-  const bool is_known = function != functions_.end() || command.name == "enDepthMask" || command.name == "frontendMode";
+  const bool is_known =
+      function != functions_.end() || command.name == "enDepthMask" || command.name == "frontendMode";
   if (!is_known) return ColaError::UnknownVariable;
   if (!value) return ColaError::TooShort;
   if (command.name == "enDepthMask") return masks_depth_ = *value != 0, std::nullopt;
@@ -167,7 +175,8 @@ std::optional<Device::Outcome> Device::writeSource(const ColaCommand& command) c
 }
 
 Device::Outcome Device::write(const ColaCommand& command, const Client& client) {
-  const bool is_there = identityVariable(command.name) || stateVariable(command.name) || sourceVariable(command.name);
+  const bool is_there =
+      identityVariable(command.name) || stateVariable(command.name) || sourceVariable(command.name);
   if (!is_there) return refused(ColaError::UnknownVariable);
   const auto needed = command.name == kTemperatureMargin ? UserLevel::Service : UserLevel::Maintenance;
   if (client.level < needed) return refused(ColaError::WriteDenied);
@@ -243,7 +252,8 @@ Device::Outcome Device::logIn(const ColaCommand& command, Client& client) {
   // A challenge is good for one answer.
   const auto challenge = std::exchange(client.challenge, {});
   const auto salt = std::exchange(client.salt, {});
-  if (password == identity_.passwords.end() || password->second.empty() || challenge.empty()) return told(kNotAccepted);
+  if (password == identity_.passwords.end() || password->second.empty() || challenge.empty())
+    return told(kNotAccepted);
   const auto expected = toftwin::visionary::responseTo(challenge, salt, *level, password->second);
   if (CRYPTO_memcmp(expected.data(), given->data(), expected.size()) != 0) return told(kNotAccepted);
   client.level = *level;

@@ -17,7 +17,8 @@ constexpr unsigned kInvalid = static_cast<unsigned>(PixelFlag::Invalid);
 /// 65,535 is none, too.
 std::uint16_t distanceCounts(double range_m) {
   const double counts = std::round(range_m * kCountsPerMetre);
-  return counts >= 1.0 && counts < kMostCounts ? static_cast<std::uint16_t>(counts) : toftwin::visionary::kNoDistance;
+  return counts >= 1.0 && counts < kMostCounts ? static_cast<std::uint16_t>(counts)
+                                               : toftwin::visionary::kNoDistance;
 }
 
 /// k1 and k2 that take distorted to undistorted radii best, over the image: least squares of two unknowns.
@@ -46,7 +47,8 @@ std::array<double, 2> radialFit(const CameraInfo& camera) {
   return {(b1 * a22 - b2 * a12) / determinant, (b2 * a11 - b1 * a12) / determinant};
 }
 
-/// On this machine's clock where its relation to the source's is known; otherwise when the daemon had the frame.
+/// On this machine's clock where its relation to the source's is known; otherwise when the daemon had the
+/// frame.
 std::int64_t hostMilliseconds(const Frame& frame) {
   constexpr std::int64_t kPerMillisecond = 1'000'000;
   const ClockRelation& clock = frame.moment.clock;
@@ -76,7 +78,8 @@ Result<CameraImages> imagesOf(const Frame& frame, double amplitude_per_count, bo
   const Plane* range = planeOf(frame, PlaneKind::Range, ElementType::F32);
   const Plane* depth = planeOf(frame, PlaneKind::Depth, ElementType::F32);
   if (range == nullptr && depth == nullptr)
-    return Error{Error::Code::Unsupported, "the source has neither range nor depth, which a Visionary is made of"};
+    return Error{Error::Code::Unsupported,
+                 "the source has neither range nor depth, which a Visionary is made of"};
   const Plane* amplitude = planeOf(frame, PlaneKind::Amplitude, ElementType::F32);
   const Plane* flags = planeOf(frame, PlaneKind::Flags, ElementType::U8);
   const auto metres = (range != nullptr ? range : depth)->as<float>();
@@ -90,7 +93,8 @@ Result<CameraImages> imagesOf(const Frame& frame, double amplitude_per_count, bo
     images.distance[i] = distanceCounts(static_cast<double>(metres[i]) / per_range);
     if (amplitude != nullptr) {
       const double counts = std::round(static_cast<double>(amplitude->as<float>()[i]) / amplitude_per_count);
-      images.intensity[i] = counts >= 0.0 ? static_cast<std::uint16_t>(std::min(counts, kMostCounts)) : std::uint16_t{0};
+      images.intensity[i] =
+          counts >= 0.0 ? static_cast<std::uint16_t>(std::min(counts, kMostCounts)) : std::uint16_t{0};
     }
     unsigned state = flags != nullptr ? flags->as<std::uint8_t>()[i] : 0U;
     if (images.distance[i] == toftwin::visionary::kNoDistance) state |= kInvalid;

@@ -32,9 +32,11 @@ Session::Wanted Session::take(const Telegram& telegram, SteadyTime now) {
     timeout_.reset();
     client_ = {};
   }
-  if (!timeout_ || telegram.session != number_) return replyTo(telegram, errorAnswer(ColaError::UnknownSession));
+  if (!timeout_ || telegram.session != number_)
+    return replyTo(telegram, errorAnswer(ColaError::UnknownSession));
   last_ = now;
-  if (command.kind == ColaCommand::Kind::Other) return replyTo(telegram, errorAnswer(ColaError::UnknownCommand));
+  if (command.kind == ColaCommand::Kind::Other)
+    return replyTo(telegram, errorAnswer(ColaError::UnknownCommand));
   if (command.kind != ColaCommand::Kind::Close) return command;
   timeout_.reset();
   client_ = {};

@@ -13,8 +13,8 @@ namespace toftwin::daemon::visionary {
 
 using SteadyTime = std::chrono::steady_clock::time_point;
 
-/// A connection's session, which its client opens, and which ends by itself when nothing is asked for as long as the
-/// client said. No sockets here.
+/// A connection's session, which its client opens, and which ends by itself when nothing is asked for as long
+/// as the client said. No sockets here.
 class Session {
  public:
   /// `number` of the session that it may open; not 0, which is none.

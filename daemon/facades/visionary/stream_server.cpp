@@ -15,7 +15,7 @@ using boost::asio::ip::tcp;
 using boost::system::error_code;
 
 constexpr std::size_t kMostStreamConnections = 16;
-constexpr std::size_t kMostBlobs = 4;             ///< that wait for a client; more are lost
+constexpr std::size_t kMostBlobs = 4;            ///< that wait for a client; more are lost
 constexpr std::chrono::seconds kCutPatience{1};  ///< with a client that does not take the half that is left
 
 }  // namespace
@@ -29,10 +29,11 @@ class StreamServer::Connection : public std::enable_shared_from_this<Connection>
     socket_.set_option(boost::asio::socket_base::keep_alive{true}, ignored);
   }
   void read() {
-    socket_.async_read_some(boost::asio::buffer(piece_), [self = shared_from_this()](error_code error, std::size_t) {
-      if (error || !*self->alive_) return self->close();
-      self->read();
-    });
+    socket_.async_read_some(boost::asio::buffer(piece_),
+                            [self = shared_from_this()](error_code error, std::size_t) {
+                              if (error || !*self->alive_) return self->close();
+                              self->read();
+                            });
   }
   bool send(const SharedBytes& blob) {
     if (is_ending_ || queue_.size() >= kMostBlobs) return false;

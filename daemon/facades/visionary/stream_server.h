@@ -15,8 +15,8 @@
 
 namespace toftwin::daemon::visionary {
 
-/// The port on which blobs leave, to all who are connected; one that is slow loses frames, one that stalls holds up
-/// nobody. What clients send there is passed over. Used on the facade's thread.
+/// The port on which blobs leave, to all who are connected; one that is slow loses frames, one that stalls
+/// holds up nobody. What clients send there is passed over. Used on the facade's thread.
 class StreamServer {
  public:
   using SharedBytes = std::shared_ptr<const toftwin::visionary::Bytes>;  // by the connections that send them

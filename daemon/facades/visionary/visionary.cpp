@@ -54,7 +54,8 @@ class VisionaryFacade final : public Facade {
     auto control =
         listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.control_port), "control_port");
     if (!control) return control.error();
-    auto stream = listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.stream_port), "stream_port");
+    auto stream =
+        listenFor(thread_.io(), place_.keys, static_cast<std::uint16_t>(keys_.stream_port), "stream_port");
     if (!stream) return stream.error();
     stream_.emplace(*std::move(stream), [this](std::size_t count) { noteConnections(count); });
     device_.emplace(Device::Identity{.serial = serialOf(place_.keys.source),
@@ -64,10 +65,10 @@ class VisionaryFacade final : public Facade {
                                                    {UserLevel::Maintenance, keys_.maintenance_password},
                                                    {UserLevel::Service, keys_.service_password}}});
     control_.emplace(*std::move(control),
-                     [this](const ColaCommand& command, Device::Client& client, ControlServer::Answer answer) {
-                       ask(command, client, std::move(answer));
-                     });
-    where_ = fmt::format("CoLa 2 on {} port {}, blobs on port {}", place_.keys.address, control_->port(), stream_->port());
+                     [this](const ColaCommand& command, Device::Client& client,
+                            ControlServer::Answer answer) { ask(command, client, std::move(answer)); });
+    where_ = fmt::format("CoLa 2 on {} port {}, blobs on port {}", place_.keys.address, control_->port(),
+                         stream_->port());
     *clients_ = 0;
     thread_.start();
     return {};
@@ -135,7 +136,8 @@ class VisionaryFacade final : public Facade {
       answer(outcome.answer);
     };
     if (outcome.changes.empty()) return conclude({});
-    link_.post([changes = outcome.changes](drivers::Source& source) { return setAll(source, changes); }, conclude);
+    link_.post([changes = outcome.changes](drivers::Source& source) { return setAll(source, changes); },
+               conclude);
   }
 
   /// What the source has now is what clients read.

@@ -42,10 +42,17 @@ void appendLens(Bytes& bytes, const HeadFrame& frame, ChunkType type, LensModel 
 }
 
 /// Results of applications and of the inertial sensor, and images that only other heads or settings give.
-constexpr std::array<std::string_view, 11> kOthers{
-    "RADIAL_DISTANCE_NOISE", "REFLECTIVITY",       "ALGO_DEBUG",         "O3R_ODS_INFO", "O3R_ODS_OCCUPANCY_GRID",
-    "O3R_RESULT_JSON",       "O3R_RESULT_ARRAY2D", "O3R_RESULT_IMU",     "O3R_ODS_FLAGS", "O3R_ODS_POLAR_OCC_GRID",
-    "O3R_ODS_EXTRINSIC_CALIBRATION_CORRECTION"};
+constexpr std::array<std::string_view, 11> kOthers{"RADIAL_DISTANCE_NOISE",
+                                                   "REFLECTIVITY",
+                                                   "ALGO_DEBUG",
+                                                   "O3R_ODS_INFO",
+                                                   "O3R_ODS_OCCUPANCY_GRID",
+                                                   "O3R_RESULT_JSON",
+                                                   "O3R_RESULT_ARRAY2D",
+                                                   "O3R_RESULT_IMU",
+                                                   "O3R_ODS_FLAGS",
+                                                   "O3R_ODS_POLAR_OCC_GRID",
+                                                   "O3R_ODS_EXTRINSIC_CALIBRATION_CORRECTION"};
 
 /// False if no head has it.
 bool appendBlob(Bytes& bytes, std::string_view id, const HeadFrame& f) {

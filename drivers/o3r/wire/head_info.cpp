@@ -16,7 +16,8 @@ using toftwin::o3d303::numberAt;
 
 constexpr std::size_t kModeSize = 32;
 // Sizes by version.
-constexpr std::size_t kTofInfo1 = 0x138, kTofInfo2 = 0x15C, kTofInfo3 = 0x1A0, kTofInfo4 = 0x1AC, kRgbInfo1 = 0x134;
+constexpr std::size_t kTofInfo1 = 0x138, kTofInfo2 = 0x15C, kTofInfo3 = 0x1A0, kTofInfo4 = 0x1AC,
+                      kRgbInfo1 = 0x134;
 
 template <class T, std::size_t N>
 void append(Bytes& bytes, const std::array<T, N>& numbers) {
@@ -113,8 +114,8 @@ LensModel inverseModelOf(const CameraInfo& camera) {
   const auto& d = camera.distortion;
   LensModel lens{.model = 1};
   std::size_t i = 0;
-  for (const double number : {camera.fx, camera.fy, camera.cx + kHalfPixel, camera.cy + kHalfPixel, 0.0, d[0], d[1],
-                              d[2], d[3], d[4]}) {
+  for (const double number : {camera.fx, camera.fy, camera.cx + kHalfPixel, camera.cy + kHalfPixel, 0.0, d[0],
+                              d[1], d[2], d[3], d[4]}) {
     lens.parameters[i++] = static_cast<float>(number);
   }
   return lens;

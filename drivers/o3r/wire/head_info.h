@@ -18,8 +18,8 @@ namespace toftwin::o3r {
 
 using toftwin::o3d303::Bytes;
 
-/// How pixels and rays are tied. Parameters of models 0 and 1: fx fy mx my alpha k1 k2 k3 k4 k5, the middle of
-/// the first pixel at (0.5, 0.5). Model 0 gives the ray (x, y, 1) of a pixel, with
+/// How pixels and rays are tied. Parameters of models 0 and 1: fx fy mx my alpha k1 k2 k3 k4 k5, the middle
+/// of the first pixel at (0.5, 0.5). Model 0 gives the ray (x, y, 1) of a pixel, with
 ///   c = ((u + 0.5 - mx) / fx - alpha c_y, (v + 0.5 - my) / fy),  r² = c_x² + c_y²
 ///   x = c_x (1 + k1 r² + k2 r⁴ + k5 r⁶) + 2 k3 c_x c_y + k4 (r² + 2 c_x²), y likewise.
 /// Model 1 has the same form from rays to pixels. Model 2 is a fish-eye: parameters 5 to 8 are k1 to k4 and 9
@@ -29,8 +29,8 @@ struct LensModel {
   std::array<float, 32> parameters{};
   bool operator==(const LensModel&) const = default;
 };
-/// x y z of the ray through that pixel, of length 1, as the maker's client works it out, in float. Zeros for a
-/// model that is not known.
+/// x y z of the ray through that pixel, of length 1, as the maker's client works it out, in float. Zeros for
+/// a model that is not known.
 std::array<float, 3> rayOf(const LensModel& lens, int u, int v);
 /// Model 1 of our camera, whose distortion goes from rays to pixels.
 LensModel inverseModelOf(const CameraInfo& camera);
@@ -47,13 +47,14 @@ struct TofInfo {
   static constexpr std::uint32_t kVersion = 4;
   std::uint32_t version = kVersion;
   float distance_resolution_m = 0.0F, amplitude_resolution = 0.0F;
-  std::array<float, 3> amplitude_factors{};  ///< by which amplitudes were multiplied, the shortest exposure first
+  std::array<float, 3>
+      amplitude_factors{};  ///< by which amplitudes were multiplied, the shortest exposure first
   OpticToUser optic_to_user{};
   LensModel intrinsics{}, inverse_intrinsics{};
   std::array<std::uint64_t, 3> exposure_starts_ns{};
   std::array<float, 3> exposures_s{};
-  float illumination_c = 0.0F;   ///< from version 3 on
-  std::string mode{}, imager{};  ///< likewise; at most 32 bytes
+  float illumination_c = 0.0F;          ///< from version 3 on
+  std::string mode{}, imager{};         ///< likewise; at most 32 bytes
   std::uint32_t measurement_block = 0;  ///< from version 4 on
   float least_range_m = 0.0F, most_range_m = 0.0F;
 };

@@ -18,9 +18,10 @@ namespace toftwin::visionary {
 using Bytes = std::vector<std::byte>;
 
 template <std::size_t Size>
-using UnsignedOf = std::conditional_t<
-    Size == 1, std::uint8_t,
-    std::conditional_t<Size == 2, std::uint16_t, std::conditional_t<Size == 4, std::uint32_t, std::uint64_t>>>;
+using UnsignedOf =
+    std::conditional_t<Size == 1, std::uint8_t,
+                       std::conditional_t<Size == 2, std::uint16_t,
+                                          std::conditional_t<Size == 4, std::uint32_t, std::uint64_t>>>;
 
 inline std::string_view textOf(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
@@ -30,8 +31,7 @@ inline std::string_view textOf(std::span<const std::byte> bytes) {
 class Writer {
  public:
   template <class Number>
-    requires std::is_arithmetic_v<Number>
-  Writer& number(Number value) {
+  requires std::is_arithmetic_v<Number> Writer& number(Number value) {
     const auto bits = std::bit_cast<UnsignedOf<sizeof(Number)>>(value);
     for (std::size_t i = sizeof(Number); i-- > 0;)
       bytes_.push_back(static_cast<std::byte>((std::uint64_t{bits} >> (8 * i)) & 0xFFU));
@@ -59,8 +59,7 @@ class Reader {
   explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
 
   template <class Number>
-    requires std::is_arithmetic_v<Number>
-  std::optional<Number> number() {
+  requires std::is_arithmetic_v<Number> std::optional<Number> number() {
     const auto part = raw(sizeof(Number));
     if (!part) return std::nullopt;
     std::uint64_t bits = 0;

@@ -18,7 +18,9 @@ constexpr std::uint8_t kBlobStx = 2, kBlobPacket = 0x62;
 constexpr std::uint16_t kProtocol = 1, kBlobId = 0, kSegments = 3, kDataVersion = 2;
 constexpr std::size_t kHeadSize = 4 + kSegments * 8, kDataHeader = 4 + 8 + 2 + 4 + 1 + 1, kFooter = 4 + 4;
 
-Error malformedBlob(std::string what) { return {Error::Code::Malformed, "Visionary blob: " + std::move(what)}; }
+Error malformedBlob(std::string what) {
+  return {Error::Code::Malformed, "Visionary blob: " + std::move(what)};
+}
 
 template <class T>
 void appendLittle(Bytes& bytes, T value) {
@@ -27,7 +29,8 @@ void appendLittle(Bytes& bytes, T value) {
 }
 
 Bytes dataOf(const BlobImages& images) {
-  const std::size_t pixels = images.distance.size_bytes() + images.intensity.size_bytes() + images.state.size_bytes();
+  const std::size_t pixels =
+      images.distance.size_bytes() + images.intensity.size_bytes() + images.state.size_bytes();
   const auto length = static_cast<std::uint32_t>(kDataHeader + pixels + kFooter);
   Bytes bytes;
   bytes.reserve(length);
@@ -64,7 +67,8 @@ class LittleReader {
     if (size == 0 || bytes_.size() < pixels * size) return image;
     image.resize(pixels);
     if (size == 2) std::memcpy(image.data(), bytes_.data(), 2 * pixels);
-    for (std::size_t i = 0; size == 1 && i < pixels; ++i) image[i] = std::to_integer<std::uint16_t>(bytes_[i]);
+    for (std::size_t i = 0; size == 1 && i < pixels; ++i)
+      image[i] = std::to_integer<std::uint16_t>(bytes_[i]);
     bytes_ = bytes_.subspan(pixels * size);
     return image;
   }
@@ -108,7 +112,8 @@ Result<Blob> readBlob(std::span<const std::byte> message) {
     counters[i] = *counter;
   }
   if (!std::ranges::is_sorted(offsets) || offsets[2] > blob.size())
-    return malformedBlob(fmt::format("segments at {}, {} and {} of {} bytes", offsets[0], offsets[1], offsets[2], blob.size()));
+    return malformedBlob(fmt::format("segments at {}, {} and {} of {} bytes", offsets[0], offsets[1],
+                                     offsets[2], blob.size()));
   return Blob{.xml = blob.subspan(offsets[0], offsets[1] - offsets[0]),
               .change_counter = counters[0],
               .data = blob.subspan(offsets[1], offsets[2] - offsets[1])};
@@ -124,8 +129,10 @@ Result<ReadImages> readImages(std::span<const std::byte> data, const Description
     images.frame_number = reader.number<std::uint32_t>();
     reader.number<std::uint16_t>();  // quality and status
   }
-  const std::size_t pixels = static_cast<std::size_t>(description.width) * static_cast<std::size_t>(description.height);
-  const std::size_t per_pixel = description.distance_bytes + description.intensity_bytes + description.state_bytes;
+  const std::size_t pixels =
+      static_cast<std::size_t>(description.width) * static_cast<std::size_t>(description.height);
+  const std::size_t per_pixel =
+      description.distance_bytes + description.intensity_bytes + description.state_bytes;
   if (description.distance_bytes > 2 || description.intensity_bytes > 2 || description.state_bytes > 2 ||
       reader.left() < pixels * per_pixel + kFooter) {
     return malformedBlob(fmt::format("{} bytes are too few for {} x {} pixels of {} bytes", data.size(),
@@ -148,7 +155,8 @@ Result<std::optional<Bytes>> BlobReader::next() {
   const auto length = *reader.number<std::uint32_t>();
   constexpr std::uint32_t kFourStx = 0x0202'0202;
   if (stx != kFourStx) return malformedBlob("a message that does not begin with four bytes of 2");
-  if (length > most_bytes_) return Error{Error::Code::TooLarge, fmt::format("Visionary blob: {} bytes", length)};
+  if (length > most_bytes_)
+    return Error{Error::Code::TooLarge, fmt::format("Visionary blob: {} bytes", length)};
   if (reader.rest().size() < length) return std::optional<Bytes>{};
   const auto begin = buffer_.begin() + kBefore;
   Bytes message{begin, begin + static_cast<std::ptrdiff_t>(length)};

@@ -28,7 +28,8 @@ const Letters* lettersOf(Kind kind) {
   return found != kLetters.end() ? found : nullptr;
 }
 
-Bytes withName(std::string_view letters, const ColaCommand& command, bool has_name, std::span<const std::byte> rest) {
+Bytes withName(std::string_view letters, const ColaCommand& command, bool has_name,
+               std::span<const std::byte> rest) {
   Writer writer;
   writer.raw(std::as_bytes(std::span{letters}));
   if (has_name) {
@@ -38,14 +39,15 @@ Bytes withName(std::string_view letters, const ColaCommand& command, bool has_na
   return writer.raw(rest).bytes();
 }
 
-/// " NAME " and what follows it; the maker's client in Python leaves the first space out. A name without a space behind it
-/// ends the command.
+/// " NAME " and what follows it; the maker's client in Python leaves the first space out. A name without a
+/// space behind it ends the command.
 std::optional<std::pair<std::string, std::span<const std::byte>>> nameIn(std::span<const std::byte> bytes) {
   const std::string_view text = textOf(bytes);
   const std::size_t begin = text.starts_with(' ') ? 1 : 0;
   const std::size_t end = std::min(text.find(' ', begin), text.size());
   if (end == begin) return std::nullopt;
-  return std::pair{std::string{text.substr(begin, end - begin)}, bytes.subspan(std::min(end + 1, bytes.size()))};
+  return std::pair{std::string{text.substr(begin, end - begin)},
+                   bytes.subspan(std::min(end + 1, bytes.size()))};
 }
 
 }  // namespace
@@ -58,11 +60,14 @@ Bytes encode(const Telegram& telegram) {
   return writer.raw(telegram.command).bytes();
 }
 
-void TelegramReader::feed(std::span<const std::byte> bytes) { buffer_.insert(buffer_.end(), bytes.begin(), bytes.end()); }
+void TelegramReader::feed(std::span<const std::byte> bytes) {
+  buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
+}
 
 Result<std::optional<Telegram>> TelegramReader::next() {
   const std::array stx{kStx, kStx, kStx, kStx};
-  const auto begin = std::search(buffer_.begin(), buffer_.end(), stx.begin(), stx.end());  // clang 14 compiles no subrange
+  const auto begin =
+      std::search(buffer_.begin(), buffer_.end(), stx.begin(), stx.end());  // clang 14 compiles no subrange
   if (begin == buffer_.end()) {
     const std::size_t kept = std::min(buffer_.size(), kStxs - 1);  // the rest of them may be under way
     buffer_.erase(buffer_.begin(), buffer_.end() - static_cast<std::ptrdiff_t>(kept));
@@ -74,12 +79,14 @@ Result<std::optional<Telegram>> TelegramReader::next() {
   const auto length = reader.number<std::uint32_t>();
   if (!length) return std::optional<Telegram>{};
   if (*length > most_bytes_)
-    return Error{Error::Code::TooLarge, fmt::format("CoLa 2: a telegram of {} bytes; {} are the most", *length, most_bytes_)};
+    return Error{Error::Code::TooLarge,
+                 fmt::format("CoLa 2: a telegram of {} bytes; {} are the most", *length, most_bytes_)};
   if (*length < kRouting + kNumbers)
     return Error{Error::Code::Malformed, fmt::format("CoLa 2: a telegram of {} bytes", *length)};
   if (reader.rest().size() < *length) return std::optional<Telegram>{};
   reader.raw(kRouting);
-  Telegram telegram{.session = *reader.number<std::uint32_t>(), .request = *reader.number<std::uint16_t>(), .command = {}};
+  Telegram telegram{
+      .session = *reader.number<std::uint32_t>(), .request = *reader.number<std::uint16_t>(), .command = {}};
   const auto command = *reader.raw(*length - kRouting - kNumbers);
   telegram.command.assign(command.begin(), command.end());
   buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(kStxs + kLength + *length));
@@ -95,7 +102,8 @@ ColaCommand readCommand(std::span<const std::byte> command) {
   if (!letters->has_name) return {.kind = letters->kind, .name = {}, .params = {rest.begin(), rest.end()}};
   const auto named = nameIn(rest);
   if (!named) return {};
-  return {.kind = letters->kind, .name = named->first, .params = {named->second.begin(), named->second.end()}};
+  return {
+      .kind = letters->kind, .name = named->first, .params = {named->second.begin(), named->second.end()}};
 }
 
 Bytes askedOf(const ColaCommand& command) {
@@ -123,8 +131,9 @@ Result<ColaAnswer> readAnswer(std::span<const std::byte> answer, const ColaComma
   }
   const Bytes expected = answerTo(asked);
   if (!text.starts_with(textOf(expected))) {
-    return Error{Error::Code::Malformed, fmt::format("CoLa 2: the answer to \"{}\" begins with \"{}\"", asked.name,
-                                                     text.substr(0, std::min<std::size_t>(text.size(), 2)))};
+    return Error{Error::Code::Malformed,
+                 fmt::format("CoLa 2: the answer to \"{}\" begins with \"{}\"", asked.name,
+                             text.substr(0, std::min<std::size_t>(text.size(), 2)))};
   }
   const auto told = answer.subspan(expected.size());
   return ColaAnswer{.told = {told.begin(), told.end()}};

@@ -15,9 +15,9 @@
 ///
 ///   02 02 02 02  length  hub  noc  session  request  command
 ///
-/// with a length of 32 bits of all that follows it, two bytes for routing, 32 bits of session and 16 bits of request
-/// number, which the answer repeats. A command is two letters, and for variables and methods " NAME ", then
-/// parameters. [SICKAG/sick_visionary_cpp_base 1.1.0]
+/// with a length of 32 bits of all that follows it, two bytes for routing, 32 bits of session and 16 bits of
+/// request number, which the answer repeats. A command is two letters, and for variables and methods " NAME
+/// ", then parameters. [SICKAG/sick_visionary_cpp_base 1.1.0]
 namespace toftwin::visionary {
 
 struct Telegram {
@@ -27,7 +27,8 @@ struct Telegram {
 };
 Bytes encode(const Telegram& telegram);
 
-/// Cuts telegrams out of a stream of bytes that arrive in pieces. What stands before four bytes of 2 is passed over.
+/// Cuts telegrams out of a stream of bytes that arrive in pieces. What stands before four bytes of 2 is
+/// passed over.
 class TelegramReader {
  public:
   explicit TelegramReader(std::size_t most_bytes) : most_bytes_(most_bytes) {}
@@ -42,7 +43,7 @@ class TelegramReader {
 
 /// Errors as CoLa numbers them.
 enum class ColaError : std::uint16_t {
-  AccessDenied = 1,       ///< the user level is too low for that method
+  AccessDenied = 1,  ///< the user level is too low for that method
   UnknownMethod = 2,
   UnknownVariable = 3,
   ConditionFailed = 4,
@@ -50,7 +51,7 @@ enum class ColaError : std::uint16_t {
   Unknown = 6,
   TooLong = 7,
   TooShort = 8,
-  WriteDenied = 10,       ///< the same for a variable
+  WriteDenied = 10,  ///< the same for a variable
   UnknownCommand = 12,
   NoSessions = 33,
   UnknownSession = 34

@@ -60,7 +60,9 @@ void addStream(pugi::xml_node format, const Description& of) {
   addImage(stream, "Confidence", of.state_bytes, "65535");
 }
 
-std::size_t bytesOf(std::string_view type) { return type == "uint8" ? 1 : type == "uint16" ? 2 : type == "uint32" ? 4 : 0; }
+std::size_t bytesOf(std::string_view type) {
+  return type == "uint8" ? 1 : type == "uint16" ? 2 : type == "uint32" ? 4 : 0;
+}
 
 void readMatrix(pugi::xml_node stream, Description& to) {
   std::size_t i = 0;
@@ -100,11 +102,13 @@ Result<Description> readDescription(std::string_view xml) {
   read.height = stream.child("Height").text().as_int();
   const auto isSide = [](int pixels) { return pixels > 0 && pixels <= kMostPixelsPerSide; };
   if (!isSide(read.width) || !isSide(read.height)) {
-    return Error{Error::Code::Malformed,
-                 fmt::format("Visionary: the blob's description has images of {} x {}", read.width, read.height)};
+    return Error{
+        Error::Code::Malformed,
+        fmt::format("Visionary: the blob's description has images of {} x {}", read.width, read.height)};
   }
   readMatrix(stream, read);
-  const pugi::xml_node matrix = stream.child("CameraMatrix"), distortion = stream.child("CameraDistortionParams");
+  const pugi::xml_node matrix = stream.child("CameraMatrix"),
+                       distortion = stream.child("CameraDistortionParams");
   const auto number = [](pugi::xml_node of, const char* name) { return of.child(name).text().as_double(); };
   read.fx = number(matrix, "FX");
   read.fy = number(matrix, "FY");

@@ -8,15 +8,16 @@
 
 #include <toftwin/result.h>
 
-/// The XML that a blob begins with: what camera it is, and how its images lie. [SICKAG/sick_visionary_cpp_base 1.1.0]
+/// The XML that a blob begins with: what camera it is, and how its images lie.
+/// [SICKAG/sick_visionary_cpp_base 1.1.0]
 namespace toftwin::visionary {
 
 struct Description {
   int width = 0, height = 0;
   /// Row by row; the last column is in millimetres.
   std::array<double, 16> camera_to_world{1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1};
-  /// Of a Visionary-T Mini the focal lengths are negative: with its clients' x = (cx - column) / fx, x is right and
-  /// y down.
+  /// Of a Visionary-T Mini the focal lengths are negative: with its clients' x = (cx - column) / fx, x is
+  /// right and y down.
   double fx = 0.0, fy = 0.0, cx = 0.0, cy = 0.0;
   double k1 = 0.0, k2 = 0.0, p1 = 0.0, p2 = 0.0, k3 = 0.0;
   double focal_to_ray_cross_mm = 0.0;

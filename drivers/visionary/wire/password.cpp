@@ -10,7 +10,8 @@
 namespace toftwin::visionary {
 namespace {
 
-constexpr std::array<std::string_view, 5> kLevelNames{"Run", "Operator", "Maintenance", "AuthorizedClient", "Service"};
+constexpr std::array<std::string_view, 5> kLevelNames{"Run", "Operator", "Maintenance", "AuthorizedClient",
+                                                      "Service"};
 
 Digest sha256(const std::vector<std::uint8_t>& bytes) {
   Digest digest{};
@@ -26,8 +27,8 @@ std::optional<UserLevel> userLevelOf(std::uint8_t number) {
   return static_cast<UserLevel>(number);
 }
 
-Digest responseTo(std::span<const std::uint8_t> challenge, std::span<const std::uint8_t> salt, UserLevel level,
-                  std::string_view password) {
+Digest responseTo(std::span<const std::uint8_t> challenge, std::span<const std::uint8_t> salt,
+                  UserLevel level, std::string_view password) {
   std::string text{kLevelNames[static_cast<std::size_t>(level)]};
   text += ":SICK Sensor:";
   text += password;

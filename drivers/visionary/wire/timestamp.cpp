@@ -10,7 +10,9 @@ using namespace std::chrono;
 
 constexpr unsigned kSecond = 10, kMinute = 16, kHour = 22, kDay = 38, kMonth = 43, kYear = 47;
 
-std::uint64_t part(std::int64_t number, unsigned shift) { return static_cast<std::uint64_t>(number) << shift; }
+std::uint64_t part(std::int64_t number, unsigned shift) {
+  return static_cast<std::uint64_t>(number) << shift;
+}
 unsigned bits(std::uint64_t packed, unsigned shift, unsigned count) {
   return static_cast<unsigned>(packed >> shift & ((std::uint64_t{1} << count) - 1));
 }

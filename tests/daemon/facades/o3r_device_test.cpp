@@ -53,11 +53,13 @@ class O3rDevice : public testing::Test {
   }
   /// As a client seals it.
   Device::Outcome sendSealed(const Json& request) {
-    const auto key = toftwin::o3d303::fromBase64(at("/device/crypto/sealedbox/public_key").get<std::string>());
+    const auto key =
+        toftwin::o3d303::fromBase64(at("/device/crypto/sealedbox/public_key").get<std::string>());
     const std::string text = request.dump();
     std::string sealed(text.size() + crypto_box_SEALBYTES, '\0');
-    crypto_box_seal(reinterpret_cast<unsigned char*>(sealed.data()), reinterpret_cast<const unsigned char*>(text.data()),
-                    text.size(), reinterpret_cast<const unsigned char*>(key->data()));
+    crypto_box_seal(reinterpret_cast<unsigned char*>(sealed.data()),
+                    reinterpret_cast<const unsigned char*>(text.data()), text.size(),
+                    reinterpret_cast<const unsigned char*>(key->data()));
     return set("/device/crypto/sealedbox/message", toftwin::o3d303::toBase64(sealed));
   }
 
@@ -88,7 +90,8 @@ TEST_F(O3rDevice, AWholeDumpCanBeSetAndChangesNothing) {
 }
 
 TEST_F(O3rDevice, ExposureAndFrameRateAreTheSourcesOfThatPort) {
-  const auto outcome = ask("set", {R"({"ports":{"port2":{"acquisition":{"exposureLong":2000,"framerate":5}}}})"});
+  const auto outcome =
+      ask("set", {R"({"ports":{"port2":{"acquisition":{"exposureLong":2000,"framerate":5}}}})"});
   EXPECT_EQ(codeOf(outcome), 0);
   ASSERT_EQ(outcome.changes.size(), 1u);
   EXPECT_THAT(outcome.changes.at(2), ElementsAre(Pair("exposure_us", 2000.0), Pair("frame_rate_hz", 5.0)));
@@ -107,9 +110,14 @@ TEST_F(O3rDevice, CountsOfMinAmplitudeAreElectronsOfTheSource) {
 }
 
 TEST_F(O3rDevice, WhatTheSourceHasNothingLikeIsReadOnly) {
-  EXPECT_EQ(codeOf(set("/ports/port0/acquisition/framerate", 3)), 0) << "passed over, as all that is only shown";
+  EXPECT_EQ(codeOf(set("/ports/port0/acquisition/framerate", 3)), 0)
+      << "passed over, as all that is only shown";
   const Json schema = jsonOf(ask("getSchema", {listOf({"/ports/port0/acquisition/framerate"})}));
-  EXPECT_EQ(schema.value("/properties/ports/properties/port0/properties/acquisition/properties/framerate/readOnly"_json_pointer, false), true);
+  EXPECT_EQ(
+      schema.value(
+          "/properties/ports/properties/port0/properties/acquisition/properties/framerate/readOnly"_json_pointer,
+          false),
+      true);
 }
 
 TEST_F(O3rDevice, WhatDoesNotFitIsRefusedWithItsPlace) {
@@ -200,7 +208,10 @@ TEST_F(O3rDevice, APasswordComesSealedAndGuardsTheKeys) {
   EXPECT_EQ(codeOf(set("/device/network/authorized_keys", "mine")), 101'005);
   const Json keys = {{"device", {{"network", {{"authorized_keys", "mine"}}}}}};
   const auto asked = [&](const char* nonce, const char* password) {
-    return sendSealed({{"nonce", nonce}, {"request", "set_configuration"}, {"password", password}, {"configuration", keys}});
+    return sendSealed({{"nonce", nonce},
+                       {"request", "set_configuration"},
+                       {"password", password},
+                       {"configuration", keys}});
   };
   EXPECT_EQ(codeOf(asked("2", "bar")), 101'005);
   EXPECT_EQ(codeOf(asked("3", "foo")), 0);
@@ -218,7 +229,8 @@ TEST_F(O3rDevice, ASealedMessageThatWasHereBeforeIsNotObeyed) {
 
 TEST_F(O3rDevice, ASealOfAnotherKeyIsNone) {
   EXPECT_EQ(codeOf(set("/device/crypto/sealedbox/message", "AAAA")), 101'010);
-  EXPECT_EQ(codeOf(set("/device/crypto/sealedbox/message", toftwin::o3d303::toBase64(std::string(200, 'x')))), 101'010);
+  EXPECT_EQ(codeOf(set("/device/crypto/sealedbox/message", toftwin::o3d303::toBase64(std::string(200, 'x')))),
+            101'010);
 }
 
 // ---- plugs ---------------------------------------------------------------------------------------

@@ -28,15 +28,17 @@ using testing::HasSubstr;
 using Json = nlohmann::json;
 using Policy = SubscribeOptions::Policy;
 
-const std::string kTwoHeads = "[[source]]\nname = 'front'\n" + kSmallSim + "[[source]]\nname = 'rear'\n" + kPattern;
+const std::string kTwoHeads =
+    "[[source]]\nname = 'front'\n" + kSmallSim + "[[source]]\nname = 'rear'\n" + kPattern;
 
 class O3rFacade : public RunningFacade {
  protected:
   void startO3r(const std::string& sources, const std::string& facade_keys) {
     xmlrpc_ = freePort();
-    start(fmt::format("{}\n[[facade]]\nkind = 'o3r'\nxmlrpc_port = {}\npcic_port = 0\ndiagnostic_port = 0\n"
-                      "discoverable = false\n{}\n",
-                      sources, xmlrpc_, facade_keys));
+    start(
+        fmt::format("{}\n[[facade]]\nkind = 'o3r'\nxmlrpc_port = {}\npcic_port = 0\ndiagnostic_port = 0\n"
+                    "discoverable = false\n{}\n",
+                    sources, xmlrpc_, facade_keys));
   }
   void startTwoHeads(const std::string& keys = {}) {
     startO3r(kTwoHeads, "source = 'front'\nports = ['', '', 'front', 'rear']\n" + keys);
@@ -151,8 +153,9 @@ TEST_F(O3rFacade, AfterARebootItIsAsSaved) {
 TEST_F(O3rFacade, AWebPagesRequestIsRefused) {
   startTwoHeads();
   RawHttp http{xmlrpc_};
-  http.send("POST /api/rpc/v1/com.ifm.efector/ HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://example.org\r\n"
-            "Content-Type: text/xml\r\nConnection: close\r\nContent-Length: 0\r\n\r\n");
+  http.send(
+      "POST /api/rpc/v1/com.ifm.efector/ HTTP/1.1\r\nHost: 127.0.0.1\r\nOrigin: http://example.org\r\n"
+      "Content-Type: text/xml\r\nConnection: close\r\nContent-Length: 0\r\n\r\n");
   EXPECT_THAT(http.receiveAll(), testing::StartsWith("HTTP/1.1 403"));
 }
 
@@ -166,13 +169,15 @@ TEST_F(O3rFacade, ASourceThatIsNotThereIsAnErrorOfTheConfiguration) {
 // ---- one truth -----------------------------------------------------------------------------------
 
 /// As the vendor's client makes a point of a head's numbers, in float.
-std::array<float, 3> pointOf(const o3r::TofInfo& info, const std::array<float, 9>& r, std::uint16_t counts, int u, int v) {
+std::array<float, 3> pointOf(const o3r::TofInfo& info, const std::array<float, 9>& r, std::uint16_t counts,
+                             int u, int v) {
   if (counts == 0) return {};
   const float d = o3r::metresOf(counts, info.distance_resolution_m);
   const auto ray = o3r::rayOf(info.intrinsics, u, v);
   std::array<float, 3> point{};
   for (std::size_t i = 0; i < 3; ++i)
-    point[i] = d * (r[3 * i] * ray[0] + r[3 * i + 1] * ray[1] + r[3 * i + 2] * ray[2]) + info.optic_to_user.translation_m[i];
+    point[i] = d * (r[3 * i] * ray[0] + r[3 * i + 1] * ray[1] + r[3 * i + 2] * ray[2]) +
+               info.optic_to_user.translation_m[i];
   return point;
 }
 
@@ -196,7 +201,8 @@ void expectSame(const Frame& native, const o3d303::FrameContent& through) {
   std::size_t with_value = 0;
   for (std::size_t i = 0; i < range_m.size(); ++i) {
     const bool is_valid = (flags[i] & 1U) == 0 && range_m[i] < 10.0F;
-    const double counts = std::round(static_cast<double>(range_m[i]) / static_cast<double>(info->distance_resolution_m));
+    const double counts =
+        std::round(static_cast<double>(range_m[i]) / static_cast<double>(info->distance_resolution_m));
     ASSERT_EQ(distance[i], is_valid ? static_cast<std::uint16_t>(counts) : 0) << i;
     ASSERT_EQ(o3r::flagsOf(confidence[i]), is_valid ? flags[i] : flags[i] | 1U) << i;
     if (!is_valid) continue;
@@ -219,8 +225,9 @@ TEST_F(O3rFacade, FramesAreTheNativeOnesAfterTheDocumentedConversionWithTheirTim
   ASSERT_EQ(set("/ports/port3/processing/extrinsicHeadToUser", {{"transX", 0.25}, {"rotX", kQuarter}}), 0);
   const auto stampOf = [](const Frame& frame) {
     const auto& moment = frame.moment;
-    return moment.clock.uncertainty_ns >= 0 ? moment.exposures.at(0).start.ns + moment.clock.host_minus_device_ns
-                                            : moment.received.ns;
+    return moment.clock.uncertainty_ns >= 0
+               ? moment.exposures.at(0).start.ns + moment.clock.host_minus_device_ns
+               : moment.received.ns;
   };
   auto native_client = client();
   auto stream = native_client.subscribe("rear", {.policy = Policy::Queue, .queue = 64});

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What an O3R facade is sent: configurations and other calls one after another to one device, and what a head's info
-// chunks hold.
+// What an O3R facade is sent: configurations and other calls one after another to one device, and what a
+// head's info chunks hold.
 #include <cmath>
 #include <cstdlib>
 #include <string>
@@ -28,7 +28,8 @@ void checkChanges(const o3r::UnitFacts& facts, const std::map<int, SourceChanges
   for (const auto& [port, changes] : all) {
     for (const auto& [name, value] : changes) {
       bool is_known = false;
-      for (const Parameter& one : facts.ports.at(port).parameters) is_known |= one.name == name && one.bounds.contains(value);
+      for (const Parameter& one : facts.ports.at(port).parameters)
+        is_known |= one.name == name && one.bounds.contains(value);
       demand(is_known);
     }
   }
@@ -42,9 +43,9 @@ void playCalls(std::string_view text) {
     device.update(kFacts);
     return device;
   }();
-  constexpr std::string_view kMethods[] = {"set",    "get",    "getSchema", "reset",        "saveInit",     "getInit",
-                                           "lock",   "unlock", "remove",    "getParameter", "factoryReset", "getInitStatus",
-                                           "reboot", "getSWVersion"};
+  constexpr std::string_view kMethods[] = {
+      "set",    "get",    "getSchema",    "reset",        "saveInit",      "getInit", "lock",
+      "unlock", "remove", "getParameter", "factoryReset", "getInitStatus", "reboot",  "getSWVersion"};
   o3r::Device device = kFresh;
   constexpr int kMostCalls = 8;  // each answer may be the whole configuration
   for (int calls = 0; !text.empty() && calls < kMostCalls; ++calls) {
@@ -54,7 +55,8 @@ void playCalls(std::string_view text) {
     if (line.empty()) continue;
     const auto method = kMethods[static_cast<unsigned char>(line.front()) % std::size(kMethods)];
     const XmlRpcValue param{std::string{line.substr(1)}};
-    const auto outcome = device.answer("/api/rpc/v1/com.ifm.efector/", XmlRpcCall{std::string{method}, {param}});
+    const auto outcome =
+        device.answer("/api/rpc/v1/com.ifm.efector/", XmlRpcCall{std::string{method}, {param}});
     checkChanges(kFacts, outcome.changes);
     static_cast<void>(encodeXmlRpc(outcome.answer));
     if (outcome.is_reboot) checkChanges(kFacts, device.restart());
@@ -79,7 +81,8 @@ void fuzzOneInput(std::span<const std::byte> bytes) {
     demand(toftwin::o3r::readTofInfo(encode(*info)).ok());
   }
   static_cast<void>(toftwin::o3r::readRgbInfo(bytes));
-  if (const auto schema = toftwin::o3d303::readSchema(text)) static_cast<void>(writeHeadFrame(*schema, toftwin::o3r::HeadFrame{}));
+  if (const auto schema = toftwin::o3d303::readSchema(text))
+    static_cast<void>(writeHeadFrame(*schema, toftwin::o3r::HeadFrame{}));
 }
 
 }  // namespace toftwin::daemon

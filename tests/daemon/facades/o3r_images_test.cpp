@@ -25,20 +25,38 @@ constexpr float kNone = std::numeric_limits<float>::quiet_NaN();
 
 Plane planeOfFloats(PlaneKind kind, std::vector<float> pixels) {
   const int width = static_cast<int>(pixels.size());
-  return {.kind = kind, .type = ElementType::F32, .width = width, .height = 1, .channels = 1, .data = toftwin::Buffer::adopt(std::move(pixels))};
+  return {.kind = kind,
+          .type = ElementType::F32,
+          .width = width,
+          .height = 1,
+          .channels = 1,
+          .data = toftwin::Buffer::adopt(std::move(pixels))};
 }
 Plane planeOfBytes(PlaneKind kind, std::vector<std::uint8_t> pixels, int channels = 1) {
   const int width = static_cast<int>(pixels.size()) / channels;
-  return {.kind = kind, .type = ElementType::U8, .width = width, .height = 1, .channels = channels, .data = toftwin::Buffer::adopt(std::move(pixels))};
+  return {.kind = kind,
+          .type = ElementType::U8,
+          .width = width,
+          .height = 1,
+          .channels = channels,
+          .data = toftwin::Buffer::adopt(std::move(pixels))};
 }
 
 Frame smallFrame() {
   Frame frame;
   frame.sequence = 7;
-  frame.camera = {.width = 4, .height = 1, .fx = 100.0, .fy = 100.0, .cx = 1.5, .cy = 0.0, .distortion = {}, .calibration_id = {}};
+  frame.camera = {.width = 4,
+                  .height = 1,
+                  .fx = 100.0,
+                  .fy = 100.0,
+                  .cx = 1.5,
+                  .cy = 0.0,
+                  .distortion = {},
+                  .calibration_id = {}};
   frame.planes = {planeOfFloats(PlaneKind::Range, {1.0F, kNone, 9.9999F, 12.0F}),
                   planeOfFloats(PlaneKind::Amplitude, {6000.0F, kNone, 0.0F, 60.0F}),
-                  planeOfBytes(PlaneKind::Flags, {0, 1, 32, 0}), planeOfBytes(PlaneKind::Exposure, {0, 0, 1, 1})};
+                  planeOfBytes(PlaneKind::Flags, {0, 1, 32, 0}),
+                  planeOfBytes(PlaneKind::Exposure, {0, 0, 1, 1})};
   frame.moment.exposures = {{{.ns = 1'000}, 1000_us, 20_MHz}, {{.ns = 5'000'000}, 100_us, 20_MHz}};
   frame.moment.clock = {.host_minus_device_ns = 2'000'000'000, .uncertainty_ns = 0};
   return frame;
@@ -57,7 +75,8 @@ TEST(O3rImages, DistancesAreCountsOfTheResolutionAndNoneIsZero) {
 TEST(O3rImages, AmplitudesAreRootsOfCountsPerMicrosecond) {
   const Frame frame = smallFrame();
   const auto images = images3d(frame, lensModelsOf(frame.camera), scales(), {});
-  // 6000 electrons are 1000 counts, of 1000 µs 1 a µs: 1 + √(1 / 1.5523e-8) = 8027.3 of which half a count is lost.
+  // 6000 electrons are 1000 counts, of 1000 µs 1 a µs: 1 + √(1 / 1.5523e-8) = 8027.3 of which half a count is
+  // lost.
   EXPECT_EQ(images->amplitude, (std::vector<std::uint16_t>{8027, 0, 1, 2539}));
   EXPECT_EQ(toftwin::o3r::amplitudeOf(0, 1.0F), -1.0F) << "none";
   EXPECT_EQ(toftwin::o3r::amplitudeOf(4, 2.0F), 18.0F);
@@ -142,7 +161,9 @@ TEST(O3rTofInfo, OfARealFrameIsRead) {
   const char* named = std::getenv("TOFTWIN_DATA");
   const std::string data = named != nullptr ? named : std::string{TOFTWIN_SOURCE_DIR} + "/../shared/data";
   std::ifstream in{data + "/ifm-o3r-frame/O3RBuffer.data", std::ios::binary};
-  if (!in) in.open(std::string{TOFTWIN_SOURCE_DIR} + "/../../shared/data/ifm-o3r-frame/O3RBuffer.data", std::ios::binary);
+  if (!in)
+    in.open(std::string{TOFTWIN_SOURCE_DIR} + "/../../shared/data/ifm-o3r-frame/O3RBuffer.data",
+            std::ios::binary);
   if (!in) GTEST_SKIP() << "no ifm-o3r-frame in $TOFTWIN_DATA or ../shared/data";
   const std::string all{std::istreambuf_iterator<char>{in}, {}};
   const auto content = toftwin::o3d303::readFrameContent(
@@ -162,7 +183,14 @@ TEST(O3rTofInfo, OfARealFrameIsRead) {
 // ---- lens ----------------------------------------------------------------------------------------
 
 TEST(O3rLens, RaysOfAPinholeAreThoseOfTheCamera) {
-  const CameraInfo camera{.width = 224, .height = 172, .fx = 124.0, .fy = 123.0, .cx = 110.0, .cy = 85.0, .distortion = {}, .calibration_id = {}};
+  const CameraInfo camera{.width = 224,
+                          .height = 172,
+                          .fx = 124.0,
+                          .fy = 123.0,
+                          .cx = 110.0,
+                          .cy = 85.0,
+                          .distortion = {},
+                          .calibration_id = {}};
   const LensModels lens = lensModelsOf(camera);
   for (const auto& [u, v] : {std::pair{0, 0}, {223, 171}, {110, 85}, {17, 140}}) {
     const auto ray = toftwin::o3r::rayOf(lens.intrinsics, u, v);
@@ -197,7 +225,8 @@ TEST(O3rLens, RotationIsAboutXThenYThenZOfTheTurnedAxes) {
 TEST(O3rSchema, ABlobThatThisHeadHasNotIsLeftOutAndAnUnknownOneIsRefused) {
   const Frame frame = smallFrame();
   const auto images = images3d(frame, lensModelsOf(frame.camera), scales(), {});
-  const auto both = writeHeadFrame(toftwin::o3r::schemaOf({toftwin::o3r::kJpegBlob, toftwin::o3r::kConfidenceBlob}), images->wire);
+  const auto both = writeHeadFrame(
+      toftwin::o3r::schemaOf({toftwin::o3r::kJpegBlob, toftwin::o3r::kConfidenceBlob}), images->wire);
   ASSERT_TRUE(both.ok());
   const auto content = toftwin::o3d303::readFrameContent(*both);
   ASSERT_TRUE(content.ok()) << content.error().message;
@@ -209,7 +238,14 @@ TEST(O3rSchema, ABlobThatThisHeadHasNotIsLeftOutAndAnUnknownOneIsRefused) {
 
 TEST(O3r2d, TheColourImageIsAJpegOfThatSize) {
   Frame frame = smallFrame();
-  frame.camera = {.width = 16, .height = 1, .fx = 100.0, .fy = 100.0, .cx = 7.5, .cy = 0.0, .distortion = {}, .calibration_id = {}};
+  frame.camera = {.width = 16,
+                  .height = 1,
+                  .fx = 100.0,
+                  .fy = 100.0,
+                  .cx = 7.5,
+                  .cy = 0.0,
+                  .distortion = {},
+                  .calibration_id = {}};
   frame.planes = {planeOfBytes(PlaneKind::Color, std::vector<std::uint8_t>(48, 200), 3)};
   const auto images = images2d(frame, lensModelsOf(frame.camera), scales(), {});
   ASSERT_TRUE(images.ok()) << images.error().message;

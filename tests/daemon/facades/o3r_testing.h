@@ -7,7 +7,10 @@
 namespace toftwin::daemon::test {
 
 inline o3r::Device o3rDevice() {
-  return {o3r::Identity{.name = "unit", .address = "127.0.0.1", .serial = "1", .macs = {"02:00", "02:01"},
+  return {o3r::Identity{.name = "unit",
+                        .address = "127.0.0.1",
+                        .serial = "1",
+                        .macs = {"02:00", "02:01"},
                         .diagnostic_port = 50'009},
           {o3r::PortIdentity{.number = 0, .is_3d = false, .pcic_port = 50'010, .serial = "2"},
            o3r::PortIdentity{.number = 2, .is_3d = true, .pcic_port = 50'012, .serial = "3"}},
@@ -17,7 +20,14 @@ inline o3r::Device o3rDevice() {
 inline o3r::UnitFacts o3rFacts() {
   o3r::UnitFacts facts{.host_ns = 1'700'000'000'000'000'000, .since_boot_ns = 1};
   o3r::PortFacts& head = facts.ports[2];
-  head.camera = {.width = 224, .height = 172, .fx = 124.0, .fy = 124.0, .cx = 111.5, .cy = 85.5, .distortion = {}, .calibration_id = {}};
+  head.camera = {.width = 224,
+                 .height = 172,
+                 .fx = 124.0,
+                 .fy = 124.0,
+                 .cx = 111.5,
+                 .cy = 85.5,
+                 .distortion = {},
+                 .calibration_id = {}};
   head.parameters = {{.name = "exposure_us", .value = 1000.0, .bounds = {10.0, 8000.0}},
                      {.name = "exposure_ratio", .value = 25.0, .bounds = {2.0, 50.0}},
                      {.name = "frame_rate_hz", .value = 10.0, .bounds = {0.1, 60.0}},

@@ -87,7 +87,8 @@ TEST(Cola2, AnAnswerIsReadByWhomItWasAsked) {
   const auto told = toftwin::visionary::readAnswer(answerTo(asked, Writer{}.number(0.5).bytes()), asked);
   ASSERT_TRUE(told.ok());
   EXPECT_EQ(Reader{told->told}.number<double>(), 0.5);
-  const auto error = toftwin::visionary::readAnswer(toftwin::visionary::errorAnswer(ColaError::TooShort), asked);
+  const auto error =
+      toftwin::visionary::readAnswer(toftwin::visionary::errorAnswer(ColaError::TooShort), asked);
   EXPECT_EQ(error->error, ColaError::TooShort);
   EXPECT_FALSE(toftwin::visionary::readAnswer(bytesOf("RA other "), asked).ok());
 }
@@ -102,7 +103,9 @@ class VisionarySession : public testing::Test {
     const auto* reply = std::get_if<Telegram>(&wanted);
     return reply != nullptr ? *reply : Telegram{0, 0, bytesOf("for the device")};
   }
-  static std::string textOf(const Telegram& telegram) { return std::string{toftwin::visionary::textOf(telegram.command)}; }
+  static std::string textOf(const Telegram& telegram) {
+    return std::string{toftwin::visionary::textOf(telegram.command)};
+  }
   Session session_{kNumber};
   SteadyTime now_{};
 };
@@ -137,16 +140,21 @@ class VisionaryDevice : public testing::Test {
   ColaError errorOf(const Device::Outcome& outcome) {
     return toftwin::visionary::readAnswer(outcome.answer, asked_)->error.value_or(ColaError{0});
   }
-  Bytes toldOf(const Device::Outcome& outcome) { return toftwin::visionary::readAnswer(outcome.answer, asked_)->told; }
+  Bytes toldOf(const Device::Outcome& outcome) {
+    return toftwin::visionary::readAnswer(outcome.answer, asked_)->told;
+  }
   /// As a client does it.
-  std::uint8_t logIn(std::string_view password, bool has_salt, UserLevel level = UserLevel::AuthorizedClient) {
+  std::uint8_t logIn(std::string_view password, bool has_salt,
+                     UserLevel level = UserLevel::AuthorizedClient) {
     const auto number = static_cast<std::uint8_t>(level);
-    const Bytes told = toldOf(ask(Kind::Call, "GetChallenge", has_salt ? Writer{}.number(number).bytes() : Bytes{}));
+    const Bytes told =
+        toldOf(ask(Kind::Call, "GetChallenge", has_salt ? Writer{}.number(number).bytes() : Bytes{}));
     EXPECT_EQ(told.size(), has_salt ? 33u : 17u);
     std::vector<std::uint8_t> all;
     for (const std::byte one : told) all.push_back(std::to_integer<std::uint8_t>(one));
     const auto challenge = std::span{all}.subspan(1, 16);
-    const auto digest = toftwin::visionary::responseTo(challenge, std::span{all}.subspan(17), level, password);
+    const auto digest =
+        toftwin::visionary::responseTo(challenge, std::span{all}.subspan(17), level, password);
     Writer writer;
     for (const std::uint8_t one : digest) writer.number(one);
     last_login_ = writer.number(number).bytes();
@@ -171,7 +179,8 @@ TEST_F(VisionaryDevice, TellsWhoItIs) {
 
 TEST_F(VisionaryDevice, TemperaturesAreTenthsOfADegreeInAList) {
   device_.update({.temperature_c = 41.26});
-  EXPECT_EQ(toldOf(ask(Kind::Read, "TemperatureValues")), Writer{}.number(std::uint16_t{1}).number(std::int16_t{413}).bytes());
+  EXPECT_EQ(toldOf(ask(Kind::Read, "TemperatureValues")),
+            Writer{}.number(std::uint16_t{1}).number(std::int16_t{413}).bytes());
   EXPECT_EQ(toldOf(ask(Kind::Read, "TmpLvl")), bytesOf({3}));
 }
 
@@ -224,7 +233,8 @@ TEST_F(VisionaryDevice, IntegrationTimeAndFramePeriodAreTheSources) {
               ElementsAre(Pair("frame_rate_hz", 20.0)));
   EXPECT_EQ(errorOf(ask(Kind::Write, "integrationTimeUs", Writer{}.number(std::uint32_t{9000}).bytes())),
             ColaError::InvalidData);
-  EXPECT_EQ(errorOf(ask(Kind::Write, "framePeriodUs", Writer{}.number(std::uint32_t{0}).bytes())), ColaError::InvalidData);
+  EXPECT_EQ(errorOf(ask(Kind::Write, "framePeriodUs", Writer{}.number(std::uint32_t{0}).bytes())),
+            ColaError::InvalidData);
 }
 
 TEST_F(VisionaryDevice, PlayingIsWithoutEndForANumberOrNotAtAll) {
@@ -240,7 +250,8 @@ TEST_F(VisionaryDevice, PlayingIsWithoutEndForANumberOrNotAtAll) {
 
 TEST(VisionaryTime, IsPackedByBits) {
   // 2023-03-31 11:09:33.250 UTC
-  const std::uint64_t packed = 250ULL | 33ULL << 10U | 9ULL << 16U | 11ULL << 22U | 31ULL << 38U | 3ULL << 43U | 2023ULL << 47U;
+  const std::uint64_t packed =
+      250ULL | 33ULL << 10U | 9ULL << 16U | 11ULL << 22U | 31ULL << 38U | 3ULL << 43U | 2023ULL << 47U;
   EXPECT_EQ(toftwin::visionary::packedTime(1'680'260'973'250), packed);
   EXPECT_EQ(toftwin::visionary::unixTime_ms(packed), 1'680'260'973'250);
   EXPECT_EQ(toftwin::visionary::unixTime_ms(0), 0) << "no date";
@@ -268,7 +279,9 @@ TEST(VisionaryBlob, IsReadAsItWasWritten) {
   Description description;
   description.width = description.height = 2;
   const std::string xml = toXml(description);
-  const Bytes bytes = toftwin::visionary::encodeBlob(xml, 3, {.packed_time = 9, .frame_number = 8, .distance = distance, .intensity = intensity, .state = state});
+  const Bytes bytes = toftwin::visionary::encodeBlob(
+      xml, 3,
+      {.packed_time = 9, .frame_number = 8, .distance = distance, .intensity = intensity, .state = state});
   toftwin::visionary::BlobReader reader{1 << 16};
   reader.feed(std::span{bytes}.first(20));
   EXPECT_FALSE(reader.next()->has_value());
@@ -297,15 +310,32 @@ TEST(VisionaryBlob, ACrcOfThatTextIsTheWellKnownOne) {
 
 Plane plane(PlaneKind kind, std::vector<float> pixels) {
   const int width = static_cast<int>(pixels.size());
-  return {.kind = kind, .type = ElementType::F32, .width = width, .height = 1, .channels = 1, .data = toftwin::Buffer::adopt(std::move(pixels))};
+  return {.kind = kind,
+          .type = ElementType::F32,
+          .width = width,
+          .height = 1,
+          .channels = 1,
+          .data = toftwin::Buffer::adopt(std::move(pixels))};
 }
 
 Frame frameOf(std::vector<float> range_m, std::vector<std::uint8_t> flags) {
   Frame frame;
   const int width = static_cast<int>(range_m.size());
-  frame.camera = {.width = width, .height = 1, .fx = 100.0, .fy = 100.0, .cx = 1.5, .cy = 0.0, .distortion = {}, .calibration_id = {}};
+  frame.camera = {.width = width,
+                  .height = 1,
+                  .fx = 100.0,
+                  .fy = 100.0,
+                  .cx = 1.5,
+                  .cy = 0.0,
+                  .distortion = {},
+                  .calibration_id = {}};
   frame.planes = {plane(PlaneKind::Range, std::move(range_m)),
-                  {.kind = PlaneKind::Flags, .type = ElementType::U8, .width = width, .height = 1, .channels = 1, .data = toftwin::Buffer::adopt(std::move(flags))}};
+                  {.kind = PlaneKind::Flags,
+                   .type = ElementType::U8,
+                   .width = width,
+                   .height = 1,
+                   .channels = 1,
+                   .data = toftwin::Buffer::adopt(std::move(flags))}};
   return frame;
 }
 
@@ -331,7 +361,14 @@ Vec3d rayOf(const Description& d, int u, int v) {
 }
 
 TEST(VisionaryLens, RaysAreThoseOfTheCamera) {
-  CameraInfo camera{.width = 512, .height = 424, .fx = 366.0, .fy = 367.0, .cx = 252.0, .cy = 205.0, .distortion = {}, .calibration_id = {}};
+  CameraInfo camera{.width = 512,
+                    .height = 424,
+                    .fx = 366.0,
+                    .fy = 367.0,
+                    .cx = 252.0,
+                    .cy = 205.0,
+                    .distortion = {},
+                    .calibration_id = {}};
   const auto expectNear = [&](double most) {
     const Description description = descriptionOf(camera);
     for (const auto& [u, v] : {std::pair{0, 0}, {511, 423}, {252, 205}, {400, 50}}) {
@@ -343,7 +380,7 @@ TEST(VisionaryLens, RaysAreThoseOfTheCamera) {
   };
   expectNear(1e-12);
   camera.distortion = {0.09, -0.27, 0.0, 0.0, 0.09};  // a Kinect v2's, of the same optics
-  expectNear(2.0 / 366.0);  // two pixels in a corner
+  expectNear(2.0 / 366.0);                            // two pixels in a corner
 }
 
 }  // namespace

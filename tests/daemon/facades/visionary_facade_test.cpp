@@ -28,8 +28,8 @@ using toftwin::visionary::Bytes;
 using toftwin::visionary::ColaCommand;
 using toftwin::visionary::ColaError;
 using toftwin::visionary::Description;
-using toftwin::visionary::ReadImages;
 using toftwin::visionary::Reader;
+using toftwin::visionary::ReadImages;
 using toftwin::visionary::Telegram;
 using toftwin::visionary::UserLevel;
 using toftwin::visionary::Writer;
@@ -82,14 +82,18 @@ class Control {
   toftwin::visionary::ColaAnswer write(std::string name, Bytes params) {
     return ask({.kind = Kind::Write, .name = std::move(name), .params = std::move(params)});
   }
-  toftwin::visionary::ColaAnswer read(std::string name) { return ask({.kind = Kind::Read, .name = std::move(name)}); }
+  toftwin::visionary::ColaAnswer read(std::string name) {
+    return ask({.kind = Kind::Read, .name = std::move(name)});
+  }
   void logIn() {
     const auto told = call("GetChallenge").told;
     ASSERT_EQ(told.size(), 17u);
     std::array<std::uint8_t, 16> challenge{};
-    for (std::size_t i = 0; i < challenge.size(); ++i) challenge[i] = std::to_integer<std::uint8_t>(told[i + 1]);
+    for (std::size_t i = 0; i < challenge.size(); ++i)
+      challenge[i] = std::to_integer<std::uint8_t>(told[i + 1]);
     Writer writer;
-    for (const auto one : toftwin::visionary::responseTo(challenge, {}, UserLevel::AuthorizedClient, "CLIENT"))
+    for (const auto one :
+         toftwin::visionary::responseTo(challenge, {}, UserLevel::AuthorizedClient, "CLIENT"))
       writer.number(one);
     EXPECT_EQ(call("SetUserLevel", writer.number(std::uint8_t{3}).bytes()).told, Bytes{std::byte{0}});
   }
@@ -138,9 +142,10 @@ class VisionaryFacade : public RunningFacade {
   void startVisionary(const std::string& source_keys, const std::string& facade_keys = {}) {
     control_ = freePort();
     stream_ = freePort();
-    start(fmt::format("[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'visionary'\nsource = 'cam'\ncontrol_port = {}\n"
-                      "stream_port = {}\n{}\n",
-                      source_keys, control_, stream_, facade_keys));
+    start(fmt::format(
+        "[[source]]\nname = 'cam'\n{}\n[[facade]]\nkind = 'visionary'\nsource = 'cam'\ncontrol_port = {}\n"
+        "stream_port = {}\n{}\n",
+        source_keys, control_, stream_, facade_keys));
     EXPECT_TRUE(eventually([&] {
       boost::asio::io_context io;
       tcp::socket socket{io};
@@ -217,7 +222,9 @@ void expectSame(const Frame& native, const Received& through) {
     const bool is_valid = (flags[i] & 1U) == 0 && counts >= 1.0 && counts < 65'535.0;
     ASSERT_EQ(through.images.distance[i], is_valid ? static_cast<std::uint16_t>(counts) : 0) << i;
     ASSERT_EQ(through.images.state[i], is_valid ? flags[i] : flags[i] | 1U) << i;
-    ASSERT_EQ(through.images.intensity[i], static_cast<std::uint16_t>(std::min(65'535.0, std::round(static_cast<double>(amplitude[i]))))) << i;
+    ASSERT_EQ(through.images.intensity[i],
+              static_cast<std::uint16_t>(std::min(65'535.0, std::round(static_cast<double>(amplitude[i])))))
+        << i;
     with_value += is_valid ? 1 : 0;
   }
   EXPECT_GT(with_value, range_m.size() / 2);
@@ -228,7 +235,8 @@ TEST_F(VisionaryFacade, FramesAreTheNativeOnesAfterTheDocumentedConversion) {
   auto native_client = client();
   auto subscribed = native_client.subscribe("cam", {.policy = Policy::Queue, .queue = 64});
   ASSERT_TRUE(subscribed.ok()) << subscribed.error().message;
-  Natives natives{*std::move(subscribed), [](const Frame& frame) { return static_cast<std::int64_t>(frame.sequence); }};
+  Natives natives{*std::move(subscribed),
+                  [](const Frame& frame) { return static_cast<std::int64_t>(frame.sequence); }};
   Stream stream{stream_};
   int compared = 0;
   for (int i = 0; i < 60 && compared < 5; ++i) {

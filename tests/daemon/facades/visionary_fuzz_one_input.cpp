@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// What a Visionary facade and its driver are sent: telegrams one after another to one session, blobs, descriptions.
+// What a Visionary facade and its driver are sent: telegrams one after another to one session, blobs,
+// descriptions.
 #include <cmath>
 #include <cstdlib>
 #include <string_view>
@@ -20,7 +21,8 @@ void demand(bool holds) {
   if (!holds) std::abort();
 }
 
-void play(const Telegram& telegram, visionary::Device& device, visionary::Session& session, visionary::SteadyTime now) {
+void play(const Telegram& telegram, visionary::Device& device, visionary::Session& session,
+          visionary::SteadyTime now) {
   const auto wanted = session.take(telegram, now);
   const auto* command = std::get_if<ColaCommand>(&wanted);
   if (command == nullptr) return demand(!std::get<Telegram>(wanted).command.empty());
