@@ -7,21 +7,11 @@
 #include <toftwin/camera_info.h>
 #include <toftwin/frame.h>
 
+#include "protocol/types/plane_of.h"
+
 namespace toftwin::daemon {
 
-/// The frame's plane of one channel and the camera's size, with all of its bytes; null where there is none.
-inline const Plane* planeOf(const Frame& frame, PlaneKind kind) {
-  const Plane* plane = frame.find(kind);
-  return plane != nullptr && plane->channels == 1 && plane->width == frame.camera.width &&
-                 plane->height == frame.camera.height && plane->data.size() == plane->byteSize()
-             ? plane
-             : nullptr;
-}
-/// The same of that type alone.
-inline const Plane* planeOf(const Frame& frame, PlaneKind kind, ElementType type) {
-  const Plane* plane = planeOf(frame, kind);
-  return plane != nullptr && plane->type == type ? plane : nullptr;
-}
+using toftwin::planeOf;
 
 /// x, y and z of each pixel's ray through the lens, row by row.
 inline std::vector<float> unitVectorsOf(const CameraInfo& camera) {

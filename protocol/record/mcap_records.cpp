@@ -204,11 +204,11 @@ void append(Bytes& out, const SummaryOffset& offset) {
   to.end(record);
 }
 
-void appendStart(Bytes& out, std::string_view library) {
+void appendStart(Bytes& out, std::string_view library, std::string_view profile) {
   Appender to{out};
   to.raw(std::as_bytes(std::span{kMagic}));
   const auto record = to.begin(Opcode::Header);
-  to.text("");  // no profile of the registry fits
+  to.text(profile);
   to.text(library);
   to.end(record);
 }

@@ -149,8 +149,8 @@ void append(Bytes& out, const MessageIndex& index);
 void append(Bytes& out, const ChunkIndex& index);
 void append(Bytes& out, const Statistics& statistics);
 void append(Bytes& out, const SummaryOffset& offset);
-/// A Header record with that library name, after the magic.
-void appendStart(Bytes& out, std::string_view library);
+/// A Header record with that library name, after the magic. `profile`: one of the registry, as "ros2", or none.
+void appendStart(Bytes& out, std::string_view library, std::string_view profile = {});
 void appendDataEnd(Bytes& out, std::uint32_t data_crc);
 /// Footer and magic; `summary` is what `footer.summary_start` points to, for its CRC.
 void appendEnd(Bytes& out, Footer footer, std::span<const std::byte> summary);

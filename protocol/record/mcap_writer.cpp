@@ -18,12 +18,12 @@ constexpr int kHurriedLevel = -7;
 }  // namespace
 
 Result<FileWriter> FileWriter::create(const std::filesystem::path& path,
-                                      const WriterOptions& options) {
+                                      const WriterOptions& options, std::string_view profile) {
   auto file = OutputFile::create(path, options.overwrite);
   if (!file) return file.error();
   FileWriter writer{std::move(file).value(), options};
   Bytes start;
-  appendStart(start, "toftwin " TOFTWIN_VERSION);
+  appendStart(start, "toftwin " TOFTWIN_VERSION, profile);
   if (auto wrote = writer.append(start); !wrote) return wrote.error();
   return writer;
 }

@@ -23,7 +23,8 @@ namespace toftwin::record::mcap {
 /// index of what was written, where there is room for it.
 class FileWriter {
  public:
-  static Result<FileWriter> create(const std::filesystem::path& path, const WriterOptions& options);
+  /// `profile`: one of MCAP's registry, as "ros2"; none of them is that of toftwin's frames.
+  static Result<FileWriter> create(const std::filesystem::path& path, const WriterOptions& options, std::string_view profile = {});
 
   /// Adds a schema or a channel; `id` is set here. Error TooLarge after 65535 of them.
   Result<std::uint16_t> addSchema(Schema schema);

@@ -219,6 +219,42 @@ TEST_F(Recorded, ReplayMakesOneHdf5FileOfARecording) {
   EXPECT_GT(std::filesystem::file_size(folder_ / "a.h5"), 15u * 16 * 8 * 4);
 }
 
+TEST_F(Recorded, FramesGoToRosAndFoxgloveAndComeBackAsTheyWere) {
+  toftwin("replay " + path("a.mcap") + " --source kinect -n 1 -p range -o " + path("before.npy"));
+  for (const std::string format : {"ros2", "foxglove"}) {
+    const Ran there = toftwin("replay " + path("a.mcap") + " -o " + path("bag.mcap") + " --format " + format);
+    ASSERT_EQ(there.status, 0) << there.err;
+    const Ran told = toftwin("info " + path("bag.mcap"));
+    EXPECT_EQ(told.status, 0) << told.err;
+    EXPECT_THAT(told.out, HasSubstr("toftwin import makes a recording of: kinect, o3d"));
+    const Ran back = toftwin("import " + path("bag.mcap") + " --overwrite -o " + path("back.mcap"));
+    ASSERT_EQ(back.status, 0) << back.err;
+    EXPECT_THAT(back.out, HasSubstr("back.mcap: 20 frames of "));
+    toftwin("replay " + path("back.mcap") + " --source kinect -n 1 -p range -o " + path("after.npy"));
+    EXPECT_EQ(record::bytesOf(folder_ / "after.npy"), record::bytesOf(folder_ / "before.npy"));
+  }
+  const Ran asked = toftwin("replay " + path("a.mcap") + " -o " + path("c.mcap"));
+  EXPECT_EQ(asked.status, 2);
+  EXPECT_THAT(asked.err, HasSubstr("can be of several formats"));
+}
+
+TEST_F(Recorded, AFrameGoesToAPipeAndWhatIsSaidDoesNot) {
+  const Ran ran = runShell("'" TOFTWIN_PROGRAM "' replay " + path("a.mcap") + " -n 1 --source kinect -o - > " + path("piped.npy"));
+  EXPECT_EQ(ran.status, 0);
+  EXPECT_THAT(ran.err, HasSubstr("range in m"));
+  toftwin("replay " + path("a.mcap") + " -n 1 --source kinect -o " + path("named.npy"));
+  EXPECT_EQ(record::bytesOf(folder_ / "piped.npy"), record::bytesOf(folder_ / "named.npy"));
+}
+
+TEST_F(Recorded, OfAFileThatIsThereNobodyIsAskedButItself) {
+  std::ofstream{folder_ / "odd"} << "\x01\x02\x03 what is this";
+  for (const std::string file : {"odd", "a.mcap"}) {
+    const Ran ran = toftwin("info " + path(file));
+    EXPECT_EQ(ran.status, 0) << ran.err;
+    EXPECT_THAT(ran.err, ::testing::Not(HasSubstr("daemon")));
+  }
+}
+
 TEST_F(Recorded, ReplayExportsFrames) {
   const Ran one =
       toftwin("replay " + path("a.mcap") + " -o " + path("at.png") + " --from 1.25 --count 1");

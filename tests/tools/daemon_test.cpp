@@ -144,6 +144,18 @@ TEST_F(WithDaemon, RecordsEveryFrame) {
   EXPECT_EQ(run("record pattern -o " + path("a.mcap") + " --count 1 --force").status, 0);
 }
 
+TEST_F(WithDaemon, RecordsWhatOtherProgramsReadDirectly) {
+  for (const std::string format : {"ros2", "foxglove"}) {
+    const Ran ran = run("record pattern -o " + path(format + ".mcap") + " --count 5 --format " + format);
+    ASSERT_EQ(ran.status, 0) << ran.err;
+    EXPECT_THAT(ran.out, HasSubstr("5 frames, "));
+    const Ran back = toftwin("import " + path(format + ".mcap") + " -o " + path(format + "_back.mcap"));
+    ASSERT_EQ(back.status, 0) << back.err;
+    EXPECT_THAT(back.out, HasSubstr("5 frames of "));
+  }
+  EXPECT_EQ(run("record pattern -o b.mcap --on-daemon --format ros2").status, 2);
+}
+
 TEST_F(WithDaemon, CtrlCEndsARecordingAndLeavesItWhole) {
   Background recorder{{TOFTWIN_PROGRAM, "record", "pattern", "-o", (folder_ / "a.mcap").string(),
                        "--address", "unix:" + socket()}};

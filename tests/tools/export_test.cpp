@@ -197,6 +197,89 @@ TEST_F(Export, PlyInWorldCoordinatesIsMovedByThePose) {
   EXPECT_LT(norm(expected.m - at(in_world)), 1e-6);  // single precision at 4 m, twice
 }
 
+std::string textOf(const std::filesystem::path& file) {
+  const auto bytes = bytesOf(file);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+TEST_F(Export, OrganisedPointsAreOneForEachPixelWithNaNWhereInvalid) {
+  for (const char* name : {"a.ply", "a.pcd"}) {
+    write(name, {.organised = true});
+    const std::string text = textOf(folder_ / name);
+    const std::string data = text.substr(text.size() - kPixels * 16);
+    std::vector<float> points(kPixels * 4);
+    std::memcpy(points.data(), data.data(), data.size());
+    for (std::size_t i = 0; i < kPixels; ++i) {
+      EXPECT_EQ(std::isnan(points[4 * i + 2]), i % 7 == 3) << name << i;
+      EXPECT_EQ(points[4 * i + 3], 300.25f + static_cast<float>(i)) << name << i;
+    }
+  }
+  EXPECT_THAT(textOf(folder_ / "a.ply"), HasSubstr("obj_info num_cols 20\nobj_info num_rows 12\n"));
+  EXPECT_THAT(textOf(folder_ / "a.pcd"), HasSubstr("WIDTH 20\nHEIGHT 12\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 240\nDATA binary\n"));
+}
+
+TEST_F(Export, PcdSaysThePoseOfTheCamera) {
+  frame_.moment.world_from_camera = Transform<World, Camera>{{0.6, 0.0, 0.8, 0.0}, {1.0, 2.0, 3.5}};
+  write("a.pcd");
+  EXPECT_THAT(textOf(folder_ / "a.pcd"), HasSubstr("FIELDS x y z intensity\nSIZE 4 4 4 4\nTYPE F F F F\nCOUNT 1 1 1 1\nWIDTH 206\nHEIGHT 1\n"
+                                                   "VIEWPOINT 1 2 3.5 0.6 0 0.8 0\nPOINTS 206\n"));
+}
+
+TEST_F(Export, TiffHoldsTheNumbersAsTheyAre) {
+  write("range.tif");
+  const cv::Mat range = image("range.tif");
+  ASSERT_EQ(range.type(), CV_32F);
+  EXPECT_EQ(std::memcmp(range.data, frame_.planes[0].data.bytes().data(), kPixels * 4), 0);
+  write("ambient.tif", {.planes = {PlaneKind::Ambient}});
+  EXPECT_EQ(image("ambient.tif").at<std::uint16_t>(11, 19), 60'239);
+  write("normal.tif", {.planes = {PlaneKind::TruthNormal}, .channel = 2});
+  EXPECT_EQ(image("normal.tif").at<float>(0, 1), 481.0f);
+}
+
+TEST_F(Export, ExrHasItsRowsWhereItsTableSays) {
+  write("a.exr");
+  const std::string text = textOf(folder_ / "a.exr");
+  const std::size_t last = text.find("screenWindowWidth");
+  ASSERT_NE(last, text.npos);
+  const std::size_t table = last + sizeof "screenWindowWidth" + sizeof "float" + 4 + 4 + 1;  // names, size, value, end of the header
+  for (std::size_t y = 0; y < kHeight; ++y) {
+    std::uint64_t at = 0;
+    std::memcpy(&at, text.data() + table + 8 * y, sizeof at);
+    std::int32_t row = -1, bytes = 0;
+    std::memcpy(&row, text.data() + at, 4);
+    std::memcpy(&bytes, text.data() + at + 4, 4);
+    EXPECT_EQ(row, static_cast<int>(y));
+    ASSERT_EQ(bytes, 4 * kWidth);
+    EXPECT_EQ(std::memcmp(text.data() + at + 8, frame_.planes[0].data.bytes().data() + y * 4 * kWidth, 4 * kWidth), 0);
+  }
+  EXPECT_EQ(text.size(), table + kHeight * (8 + 8 + 4 * kWidth));
+}
+
+TEST_F(Export, AFolderAsColmapsHasLensPosesAndDepthMaps) {
+  ExportOptions how;
+  how.format = "colmap";
+  EXPECT_THAT(errorOf("model", how), HasSubstr("does not know its pose"));
+  frame_.moment.world_from_camera = Transform<World, Camera>{{1.0, 0.0, 0.0, 0.0}, {1.0, 2.0, 3.0}};
+  write("model", how);
+  const std::filesystem::path model = folder_ / "model";
+  EXPECT_THAT(textOf(model / "sparse/0/cameras.txt"), HasSubstr("\n1 FULL_OPENCV 20 12 14 14.5 9.8 6.3 0.09 -0.27 0.001 -0.002 0.1 0 0 0\n"));
+  EXPECT_THAT(textOf(model / "sparse/0/images.txt"), HasSubstr("\n1 1 -0 -0 -0 -1 -2 -3 1 000001.png\n\n"));
+  const std::string map = textOf(model / "depth_maps/000001.png.geometric.bin");
+  EXPECT_TRUE(map.starts_with("20&12&1&"));
+  EXPECT_EQ(map.size(), 8 + 4 * kPixels);
+  EXPECT_THAT(errorOf("other.mcap", how = {}), HasSubstr("--format ros2 for a bag of ROS 2"));
+}
+
+TEST_F(Export, AFolderThatIsThereIsNotReplaced) {
+  std::filesystem::create_directory(folder_ / "tum");
+  std::ofstream{folder_ / "tum/mine.txt"} << "mine";
+  ExportOptions how;
+  how.format = "tum";
+  const auto written = exportFrame(frame_, folder_ / "tum", how);
+  EXPECT_FALSE(written);
+  EXPECT_EQ(textOf(folder_ / "tum/mine.txt"), "mine");
+}
+
 /// The header's dictionary and the data behind it, by the NPY format's own rules (version 1.0).
 std::pair<std::string, std::vector<std::byte>> readNpy(const std::filesystem::path& file) {
   const auto bytes = bytesOf(file);

@@ -9,7 +9,7 @@ namespace toftwin::cli {
 
 /// What a file of another program is, by its first bytes and not by its name, and what toftwin does with it.
 struct FileKind {
-  enum class Reader { None, Recording, Table };  ///< who of `info` can say more
+  enum class Reader { None, Recording, Bag, Table };  ///< who of `info` can say more
   Reader reader = Reader::None;
   std::string text;  ///< "picture, 512 x 424 pixels; toftwin import makes a recording of a folder of them"
 };

@@ -10,20 +10,21 @@
 
 namespace toftwin::cli {
 
-FrameFiles::FrameFiles(const OutputOptions& output, bool several)
-    : output_(output),
-      is_hdf5_(std::filesystem::path{output.file}.extension() == ".h5"),
-      is_one_(is_hdf5_ || !several) {}
+FrameFiles::FrameFiles(const OutputOptions& output, bool several) : output_(output) {
+  const auto format = formatOf(output.file, output.how.format);
+  holds_many_ = format && holdsManyFrames(*format);
+  is_one_ = holds_many_ || !several || output.file == kPipe;
+}
 
 Result<> FrameFiles::add(const Frame& frame, std::uint64_t number) {
   const ExportOptions& how = output_.how;
-  if (is_hdf5_) {
-    if (!hdf5_) {
-      auto created = Hdf5File::create(output_.file, frame, {.planes = how.planes, .about = {}});
-      if (!created) return created.error();
-      hdf5_ = *std::move(created);
+  if (holds_many_) {
+    if (!sink_) {
+      auto opened = openSink(output_.file, how, {});
+      if (!opened) return opened.error();
+      sink_ = *std::move(opened);
     }
-    if (auto wrote = hdf5_->append(frame); !wrote) return wrote;
+    if (auto wrote = sink_->add(frame); !wrote) return wrote;
   } else {
     auto wrote = exportFrame(frame, numbered(output_.file, number, !is_one_), how);
     if (!wrote) return wrote.error();
@@ -34,10 +35,10 @@ Result<> FrameFiles::add(const Frame& frame, std::uint64_t number) {
 }
 
 Result<> FrameFiles::finish() {
-  if (!hdf5_ || written_ == 0) return {};
-  note_ = hdf5_->note();
-  if (auto closed = hdf5_->close(); !closed) return closed;
-  return hdf5_->publish();
+  if (!sink_ || written_ == 0) return {};
+  const auto finished = sink_->finish();
+  note_ = sink_->note();
+  return finished;
 }
 
 std::string FrameFiles::summary() const {

@@ -2,19 +2,19 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
+#include <memory>
 #include <string>
 
 #include <toftwin/frame.h>
 #include <toftwin/result.h>
 
-#include "tools/cli/export/hdf5.h"
+#include "tools/cli/export/frame_sink.h"
 #include "tools/cli/options.h"
 
 namespace toftwin::cli {
 
 /// Where the frames of a command go: into one file each, numbered where there are several, or all into one
-/// HDF5 file.
+/// file of a format that holds many.
 class FrameFiles {
  public:
   /// `output` must outlive it.
@@ -29,8 +29,8 @@ class FrameFiles {
 
  private:
   const OutputOptions& output_;
-  bool is_hdf5_, is_one_;
-  std::optional<Hdf5File> hdf5_;
+  bool holds_many_, is_one_;
+  std::unique_ptr<FrameSink> sink_;
   std::uint64_t written_ = 0;
   std::string note_;
 };

@@ -118,7 +118,7 @@ Result<Exit> run(Options& options) {
   const auto finished = files.finish();
   if (!grabbed) return grabbed.error();
   if (!finished) return finished.error();
-  fmt::print("{}\n", files.summary());
+  fmt::print(options.output.file == kPipe ? stderr : stdout, "{}\n", files.summary());
   return Exit::Ok;
 }
 
@@ -126,19 +126,21 @@ Result<Exit> run(Options& options) {
 
 Command grabCommand() {
   using namespace grab_command;
-  return {"grab", "frames of a camera as PNG, PLY, NPY, CSV or HDF5",
+  return {"grab", "frames of a camera as PNG, PLY, NPY, CSV, HDF5 and other formats",
           "  toftwin grab kinect -o range.png                16-bit, 1 count = 1 mm, 0 = invalid\n"
           "  toftwin grab kinect -o look.png --color --plane amplitude\n"
           "  toftwin grab kinect -o cloud.ply\n"
           "  toftwin grab kinect -o frame.npy --count 100    frame-0000.npy to frame-0099.npy, "
           "consecutive\n"
           "  toftwin grab kinect -o frames.h5 --count 100    all planes of all frames in one file\n"
+          "  toftwin grab kinect -o - | python3 -c 'import io, sys, numpy; print(numpy.load(io.BytesIO(sys.stdin.buffer.read())).mean())'\n"
           "  toftwin grab kinect -o line.csv --row 212       a scan line, all planes\n",
           [](Arguments& args) -> Run {
             const auto options = std::make_shared<Options>();
             args.option("SOURCE", options->source, "name of the camera, as `toftwin list` shows it")
                 .required();
             options->output.add(args, true);
+            options->output.addFormat(args);
             args.option("-n,--frames,--count", options->count, "how many frames")
                 .within(std::uint64_t{1}, std::uint64_t{1'000'000})
                 .showsDefault();

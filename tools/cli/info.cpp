@@ -12,6 +12,7 @@
 #include "tools/cli/command.h"
 #include "tools/cli/describe.h"
 #include "tools/cli/file_kind.h"
+#include "tools/cli/info_bag.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
 
@@ -236,13 +237,13 @@ Result<Exit> describeSource(const Options& options) {
 
 Result<Exit> run(const Options& options) {
   const std::filesystem::path path{options.what};
-  if (path.extension() == ".mcap") return describeRecording(options);
   if (options.text) return printPreset(options.what);
   // A file that is there is never taken for the name of a camera; a folder may well have that of one.
   std::error_code fault;
   const bool may_be_camera = std::filesystem::is_directory(path, fault) && options.what.find('/') == std::string::npos;
   if (const auto kind = may_be_camera ? std::nullopt : kindOf(path)) {
     if (kind->reader == FileKind::Reader::Recording) return describeRecording(options);
+    if (kind->reader == FileKind::Reader::Bag) return describeBag(options.what, options.json);
     if (kind->reader == FileKind::Reader::Table) return describeCamera(options);
     if (options.json)
       fmt::print("{}", Json::object().set("file", options.what).set("kind", kind->text).text());
@@ -250,6 +251,7 @@ Result<Exit> run(const Options& options) {
       fmt::print("{}: {}\n", options.what, kind->text);
     return Exit::Ok;
   }
+  if (path.extension() == ".mcap") return describeRecording(options);  // there is none of that name
   if (path.extension() == ".toml" || options.what.starts_with(kPreset))
     return describeCamera(options);
   auto described = describeSource(options);

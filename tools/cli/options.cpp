@@ -65,16 +65,16 @@ Result<Client> DaemonOptions::connect() const {
 void OutputOptions::add(Arguments& args, bool required) {
   args.option(
           "-o,--output", file,
-          "file to write; its extension says the format: .png .ply .npy .csv .h5. Written whole or "
-          "not at all")
+          "file to write; its extension says the format: .png .tif .exr .ply .pcd .npy .csv .h5 .mcap. Written "
+          "whole or not at all")
       .required(required);
   args.option("-p,--plane", plane_names,
               "plane to write: " + planeNames() +
                   "; default: range, or depth where there is no range; "
-                  "CSV and HDF5 take several (-p range,flags), and all by default")
+                  "CSV, HDF5 and MCAP take several (-p range,flags), and all by default")
       .separatedBy(',')
       .oneAtATime();
-  args.option("--channel", how.channel, "of a plane with several (PNG, CSV)").showsDefault();
+  args.option("--channel", how.channel, "of a plane with several (PNG, TIFF, EXR, CSV)").showsDefault();
   args.option("--scale", how.mm_per_count, "PNG: millimetres per count")
       .within(1e-3, 1e3)
       .showsDefault();
@@ -84,7 +84,14 @@ void OutputOptions::add(Arguments& args, bool required) {
   args.option("--max", how.max,
               "--color: value of the last colour; default: 1 % of the pixels lie above");
   args.option("--row", how.row, "CSV: only this row of pixels");
-  args.flag("--world", how.world, "PLY: in world coordinates, if the camera knows its pose");
+  args.flag("--world", how.world, "PLY, PCD: in world coordinates, if the camera knows its pose");
+  args.flag("--organised", how.organised, "PLY, PCD: a point for each pixel, row by row, NaN where invalid");
+}
+
+void OutputOptions::addFormat(Arguments& args) {
+  args.option("--format", how.format, "where the extension does not say it (.mcap, folders, -): " + formatNames());
+  args.option("--depth-format", depth_format, "ROS 2 and Foxglove: depth in metres, or in millimetres as integers; default: 32FC1")
+      .oneOf({"32FC1", "16UC1"});
 }
 
 namespace {
@@ -99,14 +106,17 @@ Result<> fits(const std::vector<Format>& formats, const ExportOptions& how) {
   };
   const ExportOptions none;
   const auto among = [&](Format format) { return std::ranges::find(formats, format) != formats.end(); };
-  const bool is_png = among(Format::Png), is_csv = among(Format::Csv);
+  const bool is_png = among(Format::Png), is_csv = among(Format::Csv), is_picture = among(Format::Tiff) || among(Format::Exr);
+  const bool is_cloud = among(Format::Ply) || among(Format::Pcd);
   const std::array rules{
       Rule{"--row", how.row.has_value(), is_csv, ".csv"},
-      Rule{"--world", how.world, among(Format::Ply), ".ply"},
+      Rule{"--world", how.world, is_cloud, ".ply and .pcd"},
+      Rule{"--organised", how.organised, is_cloud, ".ply and .pcd"},
       Rule{"--color", how.color, is_png, ".png"},
       Rule{"--scale", how.mm_per_count != none.mm_per_count, is_png && !how.color,
            ".png without --color"},
-      Rule{"--channel", how.channel != none.channel, is_png || is_csv, ".png and .csv"},
+      Rule{"--channel", how.channel != none.channel, is_png || is_csv || is_picture, ".png, .tif, .exr and .csv"},
+      Rule{"--depth-format", how.depth_format != none.depth_format, among(Format::Ros2) || among(Format::Foxglove), "--format ros2 and foxglove"},
       Rule{"--min", how.min.has_value(), is_png && how.color, ".png with --color"},
       Rule{"--max", how.max.has_value(), is_png && how.color, ".png with --color"},
   };
@@ -127,22 +137,25 @@ Result<> fits(const std::vector<Format>& formats, const ExportOptions& how) {
 
 Result<> OutputOptions::check() {
   std::vector<Format> formats;
+  if (file == kPipe && how.format.empty()) how.format = "npy";
   if (!file.empty()) {
-    const auto format = formatOf(file);
+    const auto format = formatOf(file, how.format);
     if (!format) return format.error();
     formats.push_back(*format);
+    if (file == kPipe && holdsManyFrames(*format)) return Error{Error::Code::InvalidArgument, "-o -: this format is no stream; name a file"};
   }
   if (auto checked = check(formats); !checked) return checked;
   const bool takes_several =
-      file.empty() || formats.front() == Format::Csv || formats.front() == Format::Hdf5;
+      file.empty() || formats.front() == Format::Csv || holdsManyFrames(formats.front());
   if (takes_several || how.planes.size() <= 1) return {};
   return Error{Error::Code::InvalidArgument,
-               fmt::format("-o {} takes one plane, not {}: name one with -p, or write .csv or .h5, which "
+               fmt::format("-o {} takes one plane, not {}: name one with -p, or write .csv, .h5 or .mcap, which "
                            "take several",
                            file, how.planes.size())};
 }
 
 Result<> OutputOptions::check(const std::vector<Format>& formats) {
+  how.depth_format = depth_format == "16UC1" ? ros::DepthFormat::Millimetres : ros::DepthFormat::Metres;
   if (!file.empty()) {
     if (auto fitting = fits(formats, how); !fitting) return fitting;
   }

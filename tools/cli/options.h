@@ -10,6 +10,7 @@
 #include <toftwin/client.h>
 
 #include "tools/cli/arguments.h"
+#include "tools/cli/export/atomic_file.h"
 #include "tools/cli/export/export.h"
 
 /// Options that several subcommands have, and what they mean.
@@ -35,8 +36,11 @@ struct DaemonOptions {
 struct OutputOptions {
   std::string file;
   std::vector<std::string> plane_names;
+  std::string depth_format;
   ExportOptions how;
   void add(Arguments& args, bool required);
+  /// --format and what goes with formats of many frames.
+  void addFormat(Arguments& args);
   /// Puts the names into `how`. An unknown extension or plane, and an option that means nothing for
   /// this kind of file, are errors of the command line, before any work.
   Result<> check();

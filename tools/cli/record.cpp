@@ -8,9 +8,9 @@
 #include <optional>
 #include <thread>
 
-#include "protocol/record/recording.h"
 #include "protocol/types/counted.h"
 #include "tools/cli/command.h"
+#include "tools/cli/export/frame_sink.h"
 #include "tools/cli/options.h"
 #include "tools/cli/terminal.h"
 
@@ -20,7 +20,7 @@ namespace record_command {
 struct Options {
   DaemonOptions daemon;
   std::vector<std::string> sources;
-  std::string file;
+  std::string file, format = "toftwin";
   std::uint64_t count = 0;
   double duration_s = 0.0;
   bool drop = false;
@@ -32,7 +32,7 @@ struct Options {
 /// What the threads, one for each source, share.
 struct Recording {
   std::mutex mutex;  // guards all below
-  record::Writer writer;
+  std::unique_ptr<FrameSink> sink;
   std::uint64_t dropped = 0;    // between the camera and this file
   std::uint64_t lost = 0;       // by the device
   std::string lost_because;     // the last of them
@@ -56,7 +56,7 @@ void recordSource(Recording& recording, Subscription frames, std::uint64_t count
     recording.dropped += frame->dropped_before;
     recording.lost += frame->dropped_by_device;
     if (!frame->dropped_because.empty()) recording.lost_because = frame->dropped_because;
-    if (auto wrote = recording.writer.write(*frame); !wrote) {
+    if (auto wrote = recording.sink->add(*frame); !wrote) {
       if (!recording.error) recording.error = wrote.error();
       recording.ended = true;
       return;
@@ -94,7 +94,7 @@ Result<> recordAll(const Options& options, Client& client, Recording& recording)
         std::chrono::duration<double>(std::chrono::steady_clock::now() - began).count();
     if (options.duration_s > 0 && seconds >= options.duration_s) recording.ended = true;
     const std::lock_guard lock{recording.mutex};
-    progress.show(recording.writer.frames(),
+    progress.show(recording.sink->frames(),
                   fmt::format("{:.0f} s, {} dropped", seconds, recording.dropped));
   }
   return {};
@@ -106,28 +106,28 @@ Result<Exit> recordHere(const Options& options) {
   for (const std::string& source : options.sources) {  // before a file is made for nothing
     if (const auto details = client->describe(source); !details) return details.error();
   }
-  auto writer = record::Writer::create(options.file, {.overwrite = options.force});
-  if (!writer) {
+  auto sink = openSink(options.file, {.format = options.format}, {.in_place = true, .overwrite = options.force});
+  if (!sink) {
     using Code = Error::Code;
-    const Code code = writer.error().code;
+    const Code code = sink.error().code;
     if (std::error_code ignored; !options.force && std::filesystem::exists(options.file, ignored)) {
       return Error{code, fmt::format("{}: there is such a file already; --force replaces it",
                                      options.file)};
     }
     const bool is_place = code == Code::NotFound || code == Code::PermissionDenied;
-    return Error{is_place ? Code::StorageFull : code, writer.error().message};
+    return Error{is_place ? Code::StorageFull : code, sink.error().message};
   }
   catchInterrupts();
   Recording recording{.mutex = {},
-                      .writer = std::move(writer).value(),
+                      .sink = *std::move(sink),
                       .dropped = 0,
                       .lost = 0,
                       .lost_because = {},
                       .error = {}};
   const auto recorded = recordAll(options, *client, recording);
-  const auto closed = recording.writer.close();
-  const std::uint64_t unwritten = recording.writer.lost();
-  fmt::print("{}: {}, {} dropped{}{}\n", options.file, counted(recording.writer.frames(), "frame"),
+  const auto closed = recording.sink->finish();
+  const std::uint64_t unwritten = recording.sink->lost();
+  fmt::print("{}: {}, {} dropped{}{}\n", options.file, counted(recording.sink->frames(), "frame"),
              recording.dropped,
              recording.lost > 0 ? fmt::format(", {} lost by the device{}{}", recording.lost,
                                               recording.lost_because.empty() ? "" : ", the last ones because: ",
@@ -176,6 +176,8 @@ Result<> checkOptions(const Options& options) {
     return Error{Error::Code::InvalidArgument,
                  "on the daemon every source has its own file: record one source at a time"};
   }
+  if (options.on_daemon && options.format != "toftwin")
+    return Error{Error::Code::InvalidArgument, fmt::format("the daemon records frames as they are: leave --format {} out", options.format)};
   if (options.on_daemon && (options.count > 0 || options.duration_s > 0.0)) {
     return Error{Error::Code::InvalidArgument,
                  "a recording on the daemon runs until `--on-daemon --stop`: leave -n and --duration "
@@ -200,12 +202,14 @@ Command recordCommand() {
       "  toftwin record kinect -o a.mcap --count 1000\n"
       "  toftwin record kinect -o a.mcap --on-daemon     the daemon writes into its recording "
       "folder\n"
-      "  toftwin record kinect --on-daemon --stop\n",
+      "  toftwin record kinect --on-daemon --stop\n"
+      "  toftwin record kinect -o bag.mcap --format ros2 a bag for ROS 2\n",
       [](Arguments& args) -> Run {
         const auto options = std::make_shared<Options>();
         args.option("SOURCE", options->sources, "names of the cameras").required();
         args.option("-o,--output", options->file,
                     "file to write; with --on-daemon a name without a folder");
+        args.option("--format", options->format, "of the file: as toftwin's are, a bag of ROS 2, or Foxglove's messages").oneOf({"toftwin", "ros2", "foxglove"}).showsDefault();
         args.option("-n,--frames,--count", options->count,
                     "end after so many frames of each camera; 0: Ctrl-C ends it")
             .showsDefault();

@@ -130,7 +130,7 @@ Result<Exit> exportFrames(const Options& options, record::Reader& reader) {
     });
   }
   if (auto finished = files.finish(); !finished && ran) return finished.error();
-  if (files.written() > 0) fmt::print("{}\n", files.summary());
+  if (files.written() > 0) fmt::print(options.output.file == kPipe ? stderr : stdout, "{}\n", files.summary());
   return ran;
 }
 
@@ -191,6 +191,7 @@ Command replayCommand() {
           "  toftwin replay monday.mcap -o frame.npy         every frame: frame-0000.npy, "
           "frame-0001.npy, …\n"
           "  toftwin replay monday.mcap -o at.png --from 12.5 --count 1\n"
+          "  toftwin replay monday.mcap -o bag.mcap --format ros2   a bag for ROS 2\n"
           "  toftwin replay monday.mcap --serve              a daemon whose cameras are the "
           "recorded ones\n",
           [](Arguments& args) -> Run {
@@ -202,6 +203,7 @@ Command replayCommand() {
                 .notNegative();
             args.option("-n,--frames,--count", options->count, "only so many frames; 0: all").showsDefault();
             options->output.add(args, false);
+            options->output.addFormat(args);
             args.flag("--json", options->json, "list: one JSON object a line");
             args.flag("--serve", options->should_serve,
                       "start a daemon that replays the file; Ctrl-C ends it");

@@ -6,13 +6,13 @@
 
 #include "daemon/facades/facade.h"
 #include "daemon/facades/struck_frames.h"
+#include "protocol/ros/pixels.h"
 
 /// A source as a camera of ROS 2, without ROS: its messages and names over DDS.
 namespace toftwin::daemon::ros2 {
 
-enum class DepthFormat { Metres, Millimetres };
+using ros::DepthFormat, ros::StampClock;
 enum class Reliability { BestEffort, Reliable };
-enum class StampClock { Host, Device };
 enum class TransformKind { Static, Moving, None };
 enum class PoseType { PoseStamped, TransformMessage };
 enum class NodeInfo { Iron, Humble, None };

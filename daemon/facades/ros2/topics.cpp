@@ -8,6 +8,8 @@
 #include <limits>
 #include <utility>
 
+#include "protocol/ros/of_frame.h"
+
 namespace toftwin::daemon::ros2 {
 namespace {
 
@@ -24,12 +26,8 @@ using PoseMessage = geometry_msgs_msg_dds__PoseStamped_;
 char* textOf(std::string_view terminated) { return const_cast<char*>(terminated.data()); }
 
 Header headerOf(std::int64_t stamp_ns, const std::string& frame_id) {
-  constexpr std::int64_t kSecond_ns = 1'000'000'000;
-  const std::int64_t rest_ns = (stamp_ns % kSecond_ns + kSecond_ns) % kSecond_ns;
-  const std::int64_t seconds =
-      std::clamp<std::int64_t>((stamp_ns - rest_ns) / kSecond_ns, std::numeric_limits<std::int32_t>::min(),
-                               std::numeric_limits<std::int32_t>::max());
-  return {{static_cast<std::int32_t>(seconds), static_cast<std::uint32_t>(rest_ns)}, textOf(frame_id)};
+  const ros::Time stamp = ros::timeOf(stamp_ns);
+  return {{stamp.sec, stamp.nanosec}, textOf(frame_id)};
 }
 
 dds_sequence_uint8 sequenceOf(std::vector<std::uint8_t>& bytes) {
@@ -37,7 +35,7 @@ dds_sequence_uint8 sequenceOf(std::vector<std::uint8_t>& bytes) {
   return {size, size, bytes.data(), false};
 }
 
-Result<> writeImage(const Writer& writer, const Header& header, Pixels pixels) {
+Result<> writeImage(const Writer& writer, const Header& header, ros::Pixels pixels) {
   ImageMessage message{};
   message.header = header;
   message.height = pixels.height;
@@ -48,30 +46,26 @@ Result<> writeImage(const Writer& writer, const Header& header, Pixels pixels) {
   return writer.write(&message);
 }
 
-/// sensor_msgs/CameraInfo's plumb_bob is our own model: the same five terms in the same order.
 Result<> writeInfo(const Writer& writer, const Header& header, const CameraInfo& camera) {
   CameraInfoMessage message{};
   message.header = header;
   message.height = static_cast<std::uint32_t>(camera.height);
   message.width = static_cast<std::uint32_t>(camera.width);
-  message.distortion_model = textOf("plumb_bob");
-  std::array<double, 5> d = camera.distortion;
-  message.d = {5, 5, d.data(), false};
-  const std::array<double, 9> k{camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1};
-  const std::array<double, 9> r{1, 0, 0, 0, 1, 0, 0, 0, 1};
-  const std::array<double, 12> p{camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0};
-  std::ranges::copy(k, message.k);
-  std::ranges::copy(r, message.r);
-  std::ranges::copy(p, message.p);
+  ros::CameraInfo lens = ros::infoOf(camera);
+  message.distortion_model = textOf(lens.distortion_model);
+  const auto terms = static_cast<std::uint32_t>(lens.d.size());
+  message.d = {terms, terms, lens.d.data(), false};
+  std::ranges::copy(lens.k, message.k);
+  std::ranges::copy(lens.r, message.r);
+  std::ranges::copy(lens.p, message.p);
   return writer.write(&message);
 }
 
-Result<> writePoints(const Writer& writer, const Header& header, Points points) {
-  constexpr std::uint8_t kFloat32 = 7;
+Result<> writePoints(const Writer& writer, const Header& header, ros::Points points) {
   constexpr std::uint32_t kFloatSize = 4;
   std::vector<PointField> fields;
   for (const std::string_view name : points.fields)
-    fields.push_back({textOf(name), static_cast<std::uint32_t>(fields.size()) * kFloatSize, kFloat32, 1});
+    fields.push_back({textOf(name), static_cast<std::uint32_t>(fields.size()) * kFloatSize, ros::kFloat32, 1});
   PointsMessage message{};
   message.header = header;
   message.height = points.height;
@@ -145,7 +139,7 @@ std::uint32_t Topics::readers() const {
 }
 
 Result<bool> Topics::publish(const Frame& frame, const Damage& damage) {
-  const std::int64_t stamp_ns = stampOf(frame, keys_.clock);
+  const std::int64_t stamp_ns = ros::stampOf(frame, keys_.clock);
   const Header header = headerOf(stamp_ns, keys_.frame_id);
   bool is_read = keys_.transform == TransformKind::Moving && transform_.hasReaders();
   Result<> outcome = publishTransform(frame.moment.world_from_camera, stamp_ns);
@@ -155,23 +149,23 @@ Result<bool> Topics::publish(const Frame& frame, const Damage& damage) {
   };
   const auto strike = [&](auto& made) { damage.corrupt(std::as_writable_bytes(std::span{made.data})); };
   if ((depth_.hasReaders() || points_.hasReaders()) && (!rays_ || rays_->camera != frame.camera))
-    rays_ = raysOf(frame.camera);
+    rays_ = ros::raysOf(frame.camera);
   if (depth_info_.hasReaders()) note(writeInfo(depth_info_, header, frame.camera));
   if (amplitude_info_.hasReaders()) note(writeInfo(amplitude_info_, header, frame.camera));
   if (depth_.hasReaders()) {
-    if (auto pixels = depthOf(frame, *rays_, keys_.depth_format)) {
+    if (auto pixels = ros::depthOf(frame, *rays_, keys_.depth_format)) {
       strike(*pixels);
       note(writeImage(depth_, header, *std::move(pixels)));
     }
   }
   if (amplitude_.hasReaders()) {
-    if (auto pixels = amplitudeOf(frame)) {
+    if (auto pixels = ros::amplitudeOf(frame)) {
       strike(*pixels);
       note(writeImage(amplitude_, header, *std::move(pixels)));
     }
   }
   if (points_.hasReaders()) {
-    if (auto points = pointsOf(frame, *rays_)) {
+    if (auto points = ros::pointsOf(frame, *rays_)) {
       strike(*points);
       note(writePoints(points_, header, *std::move(points)));
     }

@@ -9,7 +9,6 @@
 #include <string>
 #include <vector>
 
-#include "daemon/facades/ros2/images.h"
 #include "daemon/facades/ros2/keys.h"
 #include "daemon/facades/ros2/participant.h"
 
@@ -37,7 +36,7 @@ class Topics {
 
   Keys keys_;
   Writer depth_, depth_info_, amplitude_, amplitude_info_, points_, transform_;
-  std::optional<Rays> rays_;
+  std::optional<ros::Rays> rays_;
   std::optional<Transform<World, Camera>> latched_;
 };
 

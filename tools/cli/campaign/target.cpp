@@ -12,22 +12,6 @@ namespace {
 
 constexpr int kDigits = 4;  // of numbered files, as `grab` numbers them
 
-const char* extensionOf(Format format) {
-  switch (format) {
-    case Format::Png:
-      return ".png";
-    case Format::Ply:
-      return ".ply";
-    case Format::Npy:
-      return ".npy";
-    case Format::Csv:
-      return ".csv";
-    case Format::Hdf5:
-      return ".h5";
-  }
-  return "";
-}
-
 bool holdsOnePlane(Format format) { return format == Format::Png || format == Format::Npy; }
 
 }  // namespace
@@ -48,7 +32,7 @@ std::vector<Product> productsIn(const std::filesystem::path& folder, const std::
   std::vector<Product> products;
   const std::string pattern = (folder / "frame-").string();
   for (const Format format : formats) {
-    Product product{.pattern = pattern, .suffix = extensionOf(format), .how = how};
+    Product product{.pattern = pattern, .suffix = std::string{extensionOf(format)}, .how = how};
     if (!holdsOnePlane(format)) {
       product.how.planes = format == Format::Ply ? std::vector<PlaneKind>{} : planes;
       products.push_back(product);

@@ -36,6 +36,10 @@ Error cannotWrite(const std::filesystem::path& file, int number) {
 }
 
 Result<> writeWhole(const std::filesystem::path& file, std::span<const std::byte> bytes) {
+  if (file == kPipe) {
+    const int number = writeAll(STDOUT_FILENO, bytes);
+    return number == 0 ? Result<>{} : Result<>{cannotWrite("standard output", number)};
+  }
   std::error_code ignored;
   const auto status = std::filesystem::status(file, ignored);
   const bool in_place =

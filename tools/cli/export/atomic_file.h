@@ -10,6 +10,9 @@
 
 namespace toftwin::cli {
 
+/// The name of a file that stands for the standard output.
+inline constexpr const char* kPipe = "-";
+
 /// Writes a file whole or not at all: into a file beside it first, which then takes its name. What
 /// is there and no regular file (a pipe, /dev/stdout) is written to directly.
 Result<> writeWhole(const std::filesystem::path& file, std::span<const std::byte> bytes);

@@ -9,27 +9,38 @@
 #include <toftwin/names.h>
 
 #include "tools/cli/export/atomic_file.h"
-#include "tools/cli/export/hdf5.h"
+#include "tools/cli/export/folders.h"
+#include "tools/cli/export/frame_sink.h"
 
 namespace toftwin::cli {
 namespace {
 
+/// `make`: a file of one frame; `open`: one of many, whose frames are added one after the other.
 struct FormatRow {
-  std::string_view extension;
+  std::string_view name, extension;
   Format format;
   Result<Exported> (*make)(const Frame&, const ExportOptions&);
+  OpenSink open;
+  std::string_view what;  ///< for people, of formats whose extension is not theirs alone
 };
-Result<Exported> noBytes(const Frame&, const ExportOptions&) {
-  return Error{Error::Code::Unsupported, "HDF5 is written into files only"};
-}
 
 constexpr std::array kFormats{
-    FormatRow{".png", Format::Png, &toPng},
-    FormatRow{".ply", Format::Ply, &toPly},
-    FormatRow{".npy", Format::Npy, &toNpy},
-    FormatRow{".csv", Format::Csv, &toCsv},
-    FormatRow{".h5", Format::Hdf5, &noBytes},
+    FormatRow{"png", ".png", Format::Png, &toPng, nullptr, ""},
+    FormatRow{"ply", ".ply", Format::Ply, &toPly, nullptr, ""},
+    FormatRow{"npy", ".npy", Format::Npy, &toNpy, nullptr, ""},
+    FormatRow{"csv", ".csv", Format::Csv, &toCsv, nullptr, ""},
+    FormatRow{"pcd", ".pcd", Format::Pcd, &toPcd, nullptr, ""},
+    FormatRow{"tiff", ".tif", Format::Tiff, &toTiff, nullptr, ""},
+    FormatRow{"exr", ".exr", Format::Exr, &toExr, nullptr, ""},
+    FormatRow{"h5", ".h5", Format::Hdf5, nullptr, &openHdf5, ""},
+    FormatRow{"ros2", ".mcap", Format::Ros2, nullptr, &openRos2, "a bag of ROS 2"},
+    FormatRow{"foxglove", ".mcap", Format::Foxglove, nullptr, &openFoxglove, "Foxglove's messages"},
+    FormatRow{"toftwin", ".mcap", Format::Recording, nullptr, &openRecording, "a recording as toftwin's are"},
+    FormatRow{"tum", "", Format::Tum, nullptr, &openTumFolder, "a folder as of TUM's RGB-D benchmark"},
+    FormatRow{"colmap", "", Format::Colmap, nullptr, &openColmapFolder, "a folder as COLMAP's"},
 };
+
+const FormatRow& rowOf(Format format) { return *std::ranges::find(kFormats, format, &FormatRow::format); }
 
 std::string namesOf(const std::vector<Plane>& planes) {
   std::string names;
@@ -49,15 +60,39 @@ void appendChannel(const Plane& plane, std::size_t channel, std::vector<float>& 
 
 }  // namespace
 
-Result<Format> formatOf(const std::filesystem::path& file) {
-  std::string known;
+std::string formatNames() {
+  std::string names;
+  for (const FormatRow& row : kFormats) names += (names.empty() ? "" : ", ") + std::string{row.name};
+  return names;
+}
+
+Result<Format> formatOf(const std::filesystem::path& file, std::string_view name) {
+  std::string known, choice;
+  std::vector<Format> found;
   for (const FormatRow& row : kFormats) {
-    if (file.extension() == row.extension) return row.format;
-    known += (known.empty() ? "" : ", ") + std::string{row.extension};
+    if (!name.empty() && row.name == name) return row.format;
+    if (file.extension() == row.extension) {
+      found.push_back(row.format);
+      choice += fmt::format("{}--format {} for {}", choice.empty() ? "" : ", ", row.name, row.what);
+    }
+    if (!row.extension.empty() && known.find(row.extension) == known.npos) known += (known.empty() ? "" : ", ") + std::string{row.extension};
   }
+  if (!name.empty()) return Error{Error::Code::InvalidArgument, fmt::format("there is no format \"{}\"; the formats are: {}", name, formatNames())};
+  if (found.size() == 1) return found.front();
+  if (found.size() > 1) return Error{Error::Code::InvalidArgument, fmt::format("{}: its extension can be of several formats: {}", file.string(), choice)};
   return Error{Error::Code::InvalidArgument,
-               fmt::format("{}: the extension says the format, and must be one of: {}",
+               fmt::format("{}: the extension says the format, and must be one of: {}; or --format says it",
                            file.string(), known)};
+}
+
+std::string_view extensionOf(Format format) { return rowOf(format).extension; }
+bool holdsManyFrames(Format format) { return rowOf(format).open != nullptr; }
+
+Result<std::unique_ptr<FrameSink>> openSink(const std::filesystem::path& file, const ExportOptions& how, const SinkOptions& options) {
+  const auto format = formatOf(file, how.format);
+  if (!format) return format.error();
+  if (const OpenSink open = rowOf(*format).open) return open(file, how, options);
+  return Error{Error::Code::InvalidArgument, fmt::format("{}: a file of {} holds one frame", file.string(), rowOf(*format).name)};
 }
 
 std::string_view unitOf(PlaneKind kind) {
@@ -105,20 +140,20 @@ Result<Picture> pictureOf(const Plane& plane, int channel) {
 
 Result<Exported> exportBytes(const Frame& frame, const std::filesystem::path& file,
                              const ExportOptions& options) {
-  const auto format = formatOf(file);
+  const auto format = formatOf(file, options.format);
   if (!format) return format.error();
-  return std::ranges::find(kFormats, *format, &FormatRow::format)->make(frame, options);
+  if (const auto make = rowOf(*format).make) return make(frame, options);
+  return Error{Error::Code::Unsupported, fmt::format("{} is written into files only", rowOf(*format).name)};
 }
 
 Result<std::string> exportFrame(const Frame& frame, const std::filesystem::path& file,
                                 const ExportOptions& options) {
-  if (const auto format = formatOf(file); format && *format == Format::Hdf5) {
-    auto hdf5 = Hdf5File::create(file, frame, {.planes = options.planes, .about = {}});
-    if (!hdf5) return hdf5.error();
-    if (auto wrote = hdf5->append(frame); !wrote) return wrote.error();
-    if (auto closed = hdf5->close(); !closed) return closed.error();
-    if (auto published = hdf5->publish(); !published) return published.error();
-    return hdf5->note();
+  if (const auto format = formatOf(file, options.format); format && holdsManyFrames(*format)) {
+    const auto sink = openSink(file, options, {});
+    if (!sink) return sink.error();
+    if (auto wrote = (*sink)->add(frame); !wrote) return wrote.error();
+    if (auto finished = (*sink)->finish(); !finished) return finished.error();
+    return (*sink)->note();
   }
   auto exported = exportBytes(frame, file, options);
   if (!exported) return exported.error();

@@ -12,15 +12,24 @@
 #include <toftwin/frame.h>
 #include <toftwin/result.h>
 
+#include "protocol/ros/pixels.h"
+
 /// Frames as files that other programs read. docs/command-line.md says what each format holds.
 namespace toftwin::cli {
 
-enum class Format { Png, Ply, Npy, Csv, Hdf5 };
+enum class Format { Png, Ply, Npy, Csv, Pcd, Tiff, Exr, Hdf5, Ros2, Foxglove, Recording, Tum, Colmap };
 
-/// By the file's extension. Error InvalidArgument names the known ones.
-Result<Format> formatOf(const std::filesystem::path& file);
+/// By its name ("ros2"), or the file's extension where that is empty. Error InvalidArgument names the known ones.
+Result<Format> formatOf(const std::filesystem::path& file, std::string_view name = {});
+/// ".png"
+std::string_view extensionOf(Format format);
+/// Whether one file holds many frames, and several planes of each.
+bool holdsManyFrames(Format format);
+/// "png, ply, …", for --help.
+std::string formatNames();
 
 struct ExportOptions {
+  std::string format{};             ///< its name; empty: the extension says it
   std::vector<PlaneKind> planes{};  ///< empty: range, or depth where there is no range (CSV, HDF5: all)
   int channel = 0;                  ///< of planes with several (PNG, CSV)
   double mm_per_count = 1.0;        ///< PNG of metres
@@ -29,7 +38,9 @@ struct ExportOptions {
   std::optional<double> min{},
       max{};                 ///< of the colours, in the plane's unit; default: of the image
   std::optional<int> row{};  ///< CSV: this row only
-  bool world = false;        ///< PLY: world coordinates instead of the camera's
+  bool world = false;        ///< points: world coordinates instead of the camera's
+  bool organised = false;    ///< points: one for each pixel, NaN where invalid
+  ros::DepthFormat depth_format = ros::DepthFormat::Metres;  ///< of ROS's and Foxglove's depth images
 };
 
 struct Exported {
@@ -41,6 +52,9 @@ Result<Exported> toPng(const Frame& frame, const ExportOptions& options);
 Result<Exported> toPly(const Frame& frame, const ExportOptions& options);
 Result<Exported> toNpy(const Frame& frame, const ExportOptions& options);
 Result<Exported> toCsv(const Frame& frame, const ExportOptions& options);
+Result<Exported> toPcd(const Frame& frame, const ExportOptions& options);
+Result<Exported> toTiff(const Frame& frame, const ExportOptions& options);
+Result<Exported> toExr(const Frame& frame, const ExportOptions& options);
 
 /// What an NPY file of an array begins with: `type` as NumPy writes it ("<f4"), `shape` with commas ("3, 424,
 /// 512").

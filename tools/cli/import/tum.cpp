@@ -8,6 +8,7 @@
 
 #include "sim/tracer/motion.h"
 #include "tools/cli/import/import_source.h"
+#include "tools/cli/import/lens/lens_file.h"
 
 namespace toftwin::cli {
 namespace {
@@ -37,22 +38,27 @@ Result<> eachLine(const std::filesystem::path& file, const Take& take) {
 
 class Tum final : public ImportSource {
  public:
-  Tum(std::vector<DepthLine> lines, sim::Motion poses, const ImportOptions& options)
-      : lines_(std::move(lines)), poses_(std::move(poses)), mm_per_count_(options.mm_per_count.value_or(kMmPerCount)) {
+  Tum(std::vector<DepthLine> lines, sim::Motion poses, std::optional<CameraInfo> lens, const ImportOptions& options)
+      : lines_(std::move(lines)), poses_(std::move(poses)), lens_(std::move(lens)), mm_per_count_(options.mm_per_count.value_or(kMmPerCount)) {
     if (!options.mm_per_count) notes_.push_back("5000 counts are taken for 1 m, as TUM's benchmark has it (--mm-per-count says otherwise)");
-    if (!options.lens) notes_.push_back("the lens is taken for that of TUM's benchmark: f = 525, centre 319.5, 239.5 (--lens and --pinhole say otherwise)");
+    if (!options.lens && !lens_) notes_.push_back("the lens is taken for that of TUM's benchmark: f = 525, centre 319.5, 239.5 (--lens and --pinhole say otherwise)");
     notes_.push_back(poses_.keys.empty() ? "there is no groundtruth.txt: frames have no poses" : fmt::format("{} poses of groundtruth.txt", poses_.keys.size()));
   }
 
   Result<ImportedFrame> next() override {
     if (at_ == lines_.size()) return Error{Error::Code::EndOfStream, "no more pictures"};
     const DepthLine& line = lines_[at_++];
-    auto image = metresOfPicture(line.file, mm_per_count_);
-    if (!image) return image.error();
-    return ImportedFrame{*std::move(image), line.time_s, poseAt(line.time_s)};
+    auto plane = planeOfPicture(line.file, PlaneKind::Depth, mm_per_count_);
+    if (!plane) return plane.error();
+    ImportedFrame frame;
+    frame.planes.push_back(*std::move(plane));
+    frame.time_ns = std::llround(line.time_s * 1e9);
+    frame.world_from_camera = poseAt(line.time_s);
+    return frame;
   }
   [[nodiscard]] std::uint64_t frames() const override { return lines_.size(); }
   [[nodiscard]] std::optional<CameraInfo> lens() const override {
+    if (lens_) return lens_;
     return CameraInfo{.width = 640, .height = 480, .fx = 525.0, .fy = 525.0, .cx = 319.5, .cy = 239.5, .distortion = {}, .calibration_id = {}};
   }
   [[nodiscard]] std::vector<std::string> notes() const override { return notes_; }
@@ -70,6 +76,7 @@ class Tum final : public ImportSource {
 
   const std::vector<DepthLine> lines_;
   const sim::Motion poses_;
+  const std::optional<CameraInfo> lens_;
   const double mm_per_count_;
   std::vector<std::string> notes_;
   std::size_t at_ = 0;
@@ -107,7 +114,14 @@ Result<std::unique_ptr<ImportSource>> openTum(const std::filesystem::path& folde
   if (lines.empty()) return Error{Error::Code::InvalidArgument, fmt::format("{}: it names no picture", (folder / "depth.txt").string())};
   auto poses = readPoses(folder / "groundtruth.txt");
   if (!poses) return poses.error();
-  return std::unique_ptr<ImportSource>{std::make_unique<Tum>(std::move(lines), *std::move(poses), options)};
+  std::optional<CameraInfo> lens;
+  std::error_code fault;
+  if (const auto file = folder / "camera.yaml"; std::filesystem::exists(file, fault)) {
+    const auto said = lensNamed(file.string());
+    if (!said) return said.error();
+    lens = said->camera;
+  }
+  return std::unique_ptr<ImportSource>{std::make_unique<Tum>(std::move(lines), *std::move(poses), std::move(lens), options)};
 }
 
 }  // namespace toftwin::cli
