@@ -252,7 +252,7 @@ TEST_F(Campaign, WhatIsWrongIsSaidBeforeAnythingIsWritten) {
            {"-o a.png --overwrite", "--overwrite has a meaning for campaigns only"},
            {"--trajectory walk.csv --position 0,0,0 -o a/", "leave the options of a pose out"},
            {"--frames 0 -o a/", "--frames"},
-           {"-o a.jpeg", ".png, .ply, .npy, .csv, .h5"}}) {
+           {"-o a.jpeg", ".png, .ply, .npy, .csv, .pcd, .tif, .exr, .h5, .mcap"}}) {
     const Ran ran = toftwin("render generic_cw " + arguments);
     EXPECT_EQ(ran.status, 2) << arguments;
     EXPECT_THAT(ran.err, HasSubstr(what)) << arguments;

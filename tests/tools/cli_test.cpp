@@ -47,7 +47,7 @@ TEST(Toftwin, AWrongCommandLineIsStatus2AndSaysWhatIsWrong) {
            {"grab kinect -o a.jpeg", ".png, .ply, .npy, .csv"},
            {"grab kinect -o a.png --plane distance", "the planes are: range, "},
            {"grab kinect -o a.png --row 3", "--row has a meaning for .csv only"},
-           {"grab kinect -o a.csv --world", "--world has a meaning for .ply only"},
+           {"grab kinect -o a.csv --world", "--world has a meaning for .ply and .pcd only"},
            {"grab kinect -o a.png --min 1", "--min has a meaning for .png with --color only"},
            {"grab kinect -o a.png --color --min 2 --max 1", "--min 2 must be less than --max 1"},
            {"record kinect -o m3.txt", "FILE.mcap"},
